@@ -50,7 +50,7 @@ class Select {
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
       signal,
-      isSame: (wished, said) => this.word(wished) === String(said),
+      isSame: (wished, said) => this.choices[this.placeOf(String(said))]?.value === wished || this.word(wished) === String(said),
     });
     this.place?.addEventListener("change", (event) => {
       const at = event.target;
@@ -62,6 +62,18 @@ class Select {
   /** Return the robot's word for a value. @param {Value} value */
   word(value) {
     return wordOf(this.state?.signal, value);
+  }
+
+  /**
+   * Return the index of the choice that the robot reports; -1 if there is none. A robot that reports
+   * text may take numbers: then the label of a choice is the robot's text.
+   *
+   * @param {string | null} said
+   */
+  placeOf(said) {
+    const place = this.choices.findIndex(({ value }) => this.word(value) === said);
+    if (place >= 0 || typeof this.state?.value !== "string") return place;
+    return this.choices.findIndex(({ label }) => label === said);
   }
 
   /**
@@ -116,7 +128,7 @@ class Select {
     attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
     // The last sent value is shown as text only: the list stays free, so that it can be sent again.
     const known = state || this.last === null ? shown : String(this.last);
-    const now = this.choices.find(({ value }) => this.word(value) === known);
+    const now = this.choices[this.placeOf(known)];
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
     write(this.now, (now?.label ?? state?.text ?? DASH) + sign);
     this.mark(shown, !giver.isReady);
@@ -130,9 +142,12 @@ class Select {
    * @param {boolean} isLocked
    */
   mark(shown, isLocked) {
-    const place = this.choices.findIndex(({ value }) => this.word(value) === shown);
+    const place = this.placeOf(shown);
     const list = this.place?.querySelector("select");
     if (list) {
+      // A reported value that cannot be chosen is shown too.
+      const other = list.options[0];
+      if (other) write(other, place < 0 && this.state && shown !== null ? this.state.text : "—");
       // During a pending command, the operator's selection stays, so that the next arrow key continues there.
       const isAsked = this.giver.isPending || this.giver.next !== null;
       const wished = isAsked ? this.chosen : this.wish.isWaiting ? this.wish.value : null;

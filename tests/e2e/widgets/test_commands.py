@@ -7,10 +7,15 @@ import pytest
 from playwright.async_api import Locator, Page
 
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import until_attribute, until_text
+from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.keys import signed_in
 from tests.e2e.processes import UrcProcess
 from tests.e2e.widgets.cranes import Crane, crane, ready
+from urc.model.driver import Argument, Command
+from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
+from urc.model.values import Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
 
@@ -55,6 +60,31 @@ async def test_a_signal_with_words_is_chosen_and_switched_by_what_the_robot_says
         await until_text(page, ".switch-word", "on")
         await until_text(page, ".state-shape", "◐")
         assert await page.locator("[data-wish=missed], [data-wish=waiting]").count() == 0
+
+
+async def test_numbers_are_chosen_for_a_robot_that_reports_words(new_page: PageMaker) -> None:
+    """Their labels are the robot's words; a word that cannot be chosen is shown too."""
+    change = Command("set_mode", {"mode": Argument("mode", "integer")}, payload=WriteSpec("x"))
+    use = WidgetUse(
+        "mode",
+        "select",
+        {"state": "mode"},
+        {"change": "set_mode"},
+        {"look": "list", "choices": ["0=manual", "4=hold"]},
+    )
+    profile = dashboard_profile(
+        signals={"mode": Signal("mode", "string")}, commands={"set_mode": change}, uses=[use]
+    )
+    robot = FakeRobot(profile)
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        chosen = "(list) => list.selectedOptions[0].text"
+        for word in ("hold", "manual", "acro"):
+            robot.set_reading("mode", word)
+            await until_text(page, ".select-now", word)
+            assert await page.eval_on_selector("select.select-list", chosen) == word
 
 
 async def test_choosing_by_keys_keeps_the_focus(
