@@ -1,21 +1,27 @@
 // @ts-check
 /**
- * Live images on the cards of the menu. Only visible cards are polled, one after the other and each
- * at most twice a second, so that thirty cards cause no more load on the server than eight.
+ * Live images on the cards of the menu. Only visible cards, and those that a short scroll shows, are
+ * polled, one after the other and each at most twice a second. So thirty cards cause no more load on
+ * the server than eight.
  */
 
 const EVERY_MS = 500;
 /** Interval for polling a robot without data. */
 const QUIET_MS = 5000;
-/** Minimum interval between two requests, for eight requests per second on the whole page. */
+/**
+ * Minimum interval between two requests, for eight requests per second on the whole page. Only the
+ * first image of a card follows the one before without a pause.
+ */
 const PACE_MS = 125;
+/** Margin of the screen in which cards count as visible, so that a scroll shows no empty card. */
+const NEAR = "50%";
 
 /**
  * @typedef {object} Look
  * @property {HTMLElement} el
  * @property {string} url
  * @property {boolean} isSeen
- * @property {number} dueMs
+ * @property {number} dueMs 0 before the first request
  * @property {string} shown object URL of the image
  */
 
@@ -27,12 +33,13 @@ export function watchPictures() {
       ? [{ el, url: el.dataset["look"] ?? "", isSeen: false, dueMs: 0, shown: "" }]
       : [],
   );
-  const sight = new IntersectionObserver((entries) => {
+  const take = (/** @type {IntersectionObserverEntry[]} */ entries) => {
     for (const { target, isIntersecting } of entries) {
       const look = looks.find(({ el }) => el === target);
       if (look) look.isSeen = isIntersecting;
     }
-  });
+  };
+  const sight = new IntersectionObserver(take, { rootMargin: `${NEAR} 0px` });
   for (const { el } of looks) sight.observe(el);
   void go(looks);
 }
@@ -44,9 +51,11 @@ async function go(looks) {
     // The card with the oldest due time is next; hidden pages poll no cards.
     const due = looks.filter((look) => look.isSeen && look.dueMs <= nowMs);
     const next = due.sort((one, other) => one.dueMs - other.dueMs)[0];
+    const isFirst = next?.dueMs === 0;
     if (next && !document.hidden) {
       next.dueMs = nowMs + EVERY_MS;
       await renew(next);
+      if (isFirst) continue;
     }
     await new Promise((resolve) => setTimeout(resolve, PACE_MS));
   }
@@ -64,6 +73,7 @@ async function renew(look) {
     else if (answer.headers.get("content-type")?.startsWith("image/")) await show(look, await answer.blob());
     else list(look, await answer.json());
   } catch {
+    look.el.dataset["shows"] ??= "";
     look.dueMs += QUIET_MS; // without a server or with an invalid image, the last image stays
   }
 }
