@@ -1,7 +1,9 @@
 """The menu in a real browser: states without a reload, order, filters, rows on a phone, sheets."""
 
+import asyncio
+
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Page, Route, expect
 
 from tests.e2e.axe import faults, prepare
 from tests.e2e.browser import SIZES, Size, choose_theme
@@ -92,6 +94,28 @@ async def test_a_hidden_tab_asks_for_nothing(new_page: PageMaker) -> None:
         page.on("request", lambda request: asked.append(request.url))
         await page.wait_for_timeout(5000)
         assert asked == []
+
+
+async def test_letters_appear_only_where_the_robot_has_no_picture(new_page: PageMaker) -> None:
+    """The cards below the screen are asked too, so that a scroll finds their pictures."""
+    asked: set[str] = set()
+    gate = asyncio.Event()
+
+    async def answer(route: Route) -> None:
+        asked.add(route.request.url)
+        await gate.wait()
+        await route.fulfill(status=204)
+
+    async with running_dashboard(*fleet(11)) as address:
+        page = await new_page(size="phone")
+        await page.route("**/robots/*/card", answer)
+        await page.goto(address)
+        letters = page.locator(f"{card(page, 0)} .urc-look-blank")
+        await until(lambda: len(asked) == 1)
+        await expect(letters).to_be_hidden()
+        gate.set()
+        await expect(letters).to_be_visible()
+        await until(lambda: len(asked) == 11)
 
 
 async def test_the_whole_card_is_the_link_and_the_rest_is_behind_a_button(

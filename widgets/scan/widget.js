@@ -222,7 +222,7 @@ class Scan {
     this.sheet.show();
   }
 
-  /** Write the distance between two rings beside the picture, where it covers no obstacle. */
+  /** Write the distance between two rings next to the picture, where it covers no obstacle. */
   tellScale() {
     const hasRings = this.rim > 0 && (this.view === "polar" || this.view === "map");
     const { symbol, factor } = this.unit("ranges");
