@@ -24,7 +24,7 @@ WIDGETS = FOLDER.parent / "widgets"
 FILES = sorted(FOLDER.glob("*.yaml"))
 SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml")])
 
-ON_THE_WAY = {"plan", "goal_x", "goal_y", "waypoint"}
+ON_THE_WAY = {"plan", "plan_frame", "map_plan", "goal_x", "goal_y", "waypoint"}
 """Signals that a robot has only while it drives by itself; see `test_worlds`."""
 LISTENED_S = 20.0
 """How long the emulated robot is listened to: more than twice the slowest poll."""

@@ -10,8 +10,8 @@ import msgspec
 from urc.model.payload import Envelope
 from urc.transports.base import TOPICS
 from urc.transports.ros.foxglove_frames import AdvertisedChannel
-from urc.transports.ros.foxglove_session import FoxgloveSession, TopicWish
-from urc.transports.ros.foxglove_topics import MAX_GRAPH, FoxgloveTopics
+from urc.transports.ros.foxglove_session import FoxgloveSession
+from urc.transports.ros.foxglove_topics import MAX_GRAPH, FoxgloveTopics, TopicWish
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.rosapi_topics import MAX_ASKED, RosapiTopics
 from urc.transports.ros.topic_list import (

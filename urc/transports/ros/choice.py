@@ -16,7 +16,7 @@ from urc.transports.ros import rosbridge
 from urc.transports.ros.foxglove import DEFAULT_PORT as FOXGLOVE_PORT
 from urc.transports.ros.foxglove import FoxgloveTransport
 from urc.transports.ros.foxglove_frames import SUBPROTOCOLS
-from urc.transports.ros.foxglove_session import TopicWish
+from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.rosbridge import RosbridgeTransport
 from urc.transports.ros.rosbridge_operations import MAX_BYTES
 from urc.transports.websocket import WebSocketTransport

@@ -19,7 +19,8 @@ from typing import Final
 
 from urc.model.payload import Envelope, Payload
 from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
-from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession, TopicWish
+from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession
+from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue

@@ -22,7 +22,7 @@ import re
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 from urc.model.payload import Envelope
 from urc.transports._faults import one_line
@@ -42,7 +42,7 @@ from urc.transports.ros.foxglove_frames import (
     publish_frame,
     service_of,
 )
-from urc.transports.ros.foxglove_topics import FoxgloveTopics
+from urc.transports.ros.foxglove_topics import FoxgloveTopics, TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import RobotTime
@@ -51,7 +51,7 @@ from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
 
-__all__ = ["KNOWN_TOPICS", "FoxgloveSession", "TopicWish"]
+__all__ = ["KNOWN_TOPICS", "FoxgloveSession"]
 
 MAX_CHANNELS: Final = 4096
 """Maximum number of known services, and of known channels; further services and channels are
@@ -71,14 +71,6 @@ PARAMETER: Final = "parameter:"
 """Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 
 log = logging.getLogger(__name__)
-
-
-class TopicWish(NamedTuple):
-    """A topic that the driver subscribes to."""
-
-    topic: str
-    type: str = ""
-    throttle_s: float = 0.0
 
 
 class _Subscription:

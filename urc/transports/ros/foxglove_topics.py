@@ -6,19 +6,27 @@ channels, so the type of a topic that URC alone publishes is not reported. No I/
 """
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from urc.model.payload import Envelope
 from urc.transports.ros.foxglove_frames import AdvertisedChannel
 from urc.transports.ros.graph import version_of
 from urc.transports.ros.topic_list import MAX_TOPICS, TopicRow, answer_of, short_type, wanted_of
 
-__all__ = ["FoxgloveTopics"]
+__all__ = ["FoxgloveTopics", "TopicWish"]
 
 MAX_GRAPH: Final = 4096
 """Maximum number of topics with known publishers, and of topics with known subscribers."""
 _NODES: Final = 64
 """Maximum number of nodes that are stored for each topic."""
+
+
+class TopicWish(NamedTuple):
+    """A topic that the driver subscribes to."""
+
+    topic: str
+    type: str = ""
+    throttle_s: float = 0.0
 
 
 class FoxgloveTopics:
