@@ -104,6 +104,16 @@ def test_the_value_becomes_the_message_again() -> None:
     assert build_converter(signal)(value) == value
 
 
+def test_a_repeated_grid_that_is_not_encoded_is_the_same_value() -> None:
+    """A debounced signal compares values."""
+    convert = GridConverter()
+    convert.is_deferring = True
+    first, again = convert(grid(1, 1, [0])), convert(grid(1, 1, [0]))
+    assert first == again
+    assert len({first, again}) == 1  # type: ignore[arg-type]
+    assert convert(grid(1, 1, [1])) != first
+
+
 def test_an_update_replaces_a_rectangle() -> None:
     convert = GridConverter()
     convert(grid(4, 3, [0] * 12))

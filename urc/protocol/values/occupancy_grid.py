@@ -79,6 +79,12 @@ class UnencodedGrid:
         """Store the grid; the same grid always means the same image."""
         self.grid = grid
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, UnencodedGrid) and self.grid is other.grid
+
+    def __hash__(self) -> int:
+        return id(self.grid)
+
 
 class GridConverter:
     """The conversion of grids and updates to images, for one signal of one connection.
