@@ -1,4 +1,4 @@
-"""`urc discover`: find announced robots, serial ports and rosbridge topics."""
+"""`urc discover`: find announced robots, serial ports and ROS topics."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,17 +1,14 @@
-"""List the topics of a robot behind rosbridge, and write the YAML that declares them."""
+"""List the topics of a ROS robot, and write the YAML that declares them."""
 
-import asyncio
 import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from urc.model.payload import Envelope
 from urc.model.values import NOTHING
-from urc.transports.base import Transport, TransportError
+from urc.runtime.ros_survey import list_topics
+from urc.transports.base import Transport
 
 __all__ = ["RosTopic", "ros_topics", "snippet"]
-
-ANSWER_S = 5.0
 
 _FIELDS: Mapping[str, Mapping[str, tuple[str, str]]] = {
     # Type → signal → place in the message, and unit: common_interfaces, REP-103.
@@ -36,38 +33,22 @@ class RosTopic(NamedTuple):
 
     name: str
     type: str
-    """Message type; "" if unknown to rosapi."""
+    """Message type; "" if unknown."""
 
 
 async def ros_topics(transport: Transport, timeout_s: float) -> list[RosTopic]:
-    """Open the rosbridge transport, ask rosapi for all topics, and close the transport.
+    """Open a ROS transport, list all topics, and close the transport.
 
     Raises:
-        TransportError: the bridge or rosapi does not respond, or the reply contains no topics.
+        TransportError: the robot does not respond, or its topics cannot be listed.
     """
     try:
         await transport.open(timeout_s)
-        await transport.send(Envelope("call", {"service": "/rosapi/topics", "id": 1}, {}))
-        async with asyncio.timeout(ANSWER_S):
-            while True:
-                said = await transport.receive()
-                if isinstance(said, Envelope) and said.verb == "response":
-                    break
-    except TimeoutError:
-        text = f"{transport.address}: rosapi has not replied within {ANSWER_S:g} s; is it running?"
-        raise TransportError(text) from None
+        found = await list_topics(transport)
     finally:
         await transport.close()
-    if said.attributes.get("ok") is not True:
-        raise TransportError(
-            f"{transport.address}: rosapi is not available ({said.attributes.get('reason')})"
-        )
-    values = said.body if isinstance(said.body, Mapping) else NOTHING
-    names, types = values.get("topics"), values.get("types")
-    if not isinstance(names, list) or not isinstance(types, list):
-        raise TransportError(f"{transport.address}: the reply from rosapi contains no topics")
-    types += [""] * (len(names) - len(types))
-    return sorted(RosTopic(str(name), str(kind)) for name, kind in zip(names, types, strict=False))
+    types = {row.name: (row.carries or row.takes or ("",))[0] for row in found.rows}
+    return sorted(RosTopic(name, kind) for name, kind in types.items())
 
 
 def snippet(topics: Sequence[RosTopic], transport: str) -> str:

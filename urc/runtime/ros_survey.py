@@ -14,7 +14,7 @@ from urc.transports.base import TOPICS, Transport, TransportError, TransportSetu
 from urc.transports.ros.choice import PORTS, AnyBridgeTransport
 from urc.transports.ros.topic_list import TopicList, list_of, request_for
 
-__all__ = ["RosSurvey", "survey"]
+__all__ = ["RosSurvey", "list_topics", "survey"]
 
 OPEN_S: Final = 4.0
 """Maximum time for opening each kind of connection, in seconds."""
@@ -56,7 +56,7 @@ async def survey(table: Table, host: str, port: int | None) -> RosSurvey:
             continue
         try:
             await transport.open(OPEN_S)
-            found = await _listed(transport)
+            found = await list_topics(transport)
         except TransportError as fault:
             faults.append(str(fault))
             continue
@@ -68,8 +68,14 @@ async def survey(table: Table, host: str, port: int | None) -> RosSurvey:
     raise UrcError("; ".join(faults))
 
 
-async def _listed(transport: Transport) -> TopicList:
-    """Request the topics until two successive lists have equally many; return the last list."""
+async def list_topics(transport: Transport) -> TopicList:
+    """Return the topics of the robot behind an open ROS transport.
+
+    The list is complete when two successive lists have equally many topics.
+
+    Raises:
+        TransportError: the connection cannot list topics, or lists none.
+    """
     last: TopicList | None = None
     try:
         async with asyncio.timeout(LIST_S):

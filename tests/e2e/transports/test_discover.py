@@ -14,6 +14,7 @@ from zeroconf.asyncio import AsyncZeroconf
 
 from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
+from tests.e2e.transports.ros_bases import STAMPED, TOPICS, open_base
 from urc.config.load import load_profile
 from urc.runtime.discover import RosTopic, ros_topics, snippet
 from urc.runtime.registries import built_in_catalog
@@ -158,3 +159,15 @@ async def discover(*arguments: str, expects: int | None = 0) -> str:
     said, _ = await asyncio.wait_for(process.communicate(), WAIT_S)
     assert expects is None or process.returncode == expects
     return said.decode()
+
+
+async def test_topics_are_listed_over_each_kind_of_connection(tmp_path: Path) -> None:
+    """From the command line, with a profile that has no messages yet."""
+    text = ROVER.replace('port: "{{', 'via: zenoh, port: "{{')
+    file = tmp_path / "rover.yaml"
+    file.write_text(text)
+    async with open_base("zenoh", tmp_path) as base:
+        said = await discover(str(file), "--set", f"port={base.port}", "--json", "--for", "100ms")
+    found = {row["place"]: row["what"] for row in map(json.loads, said.splitlines())}
+    assert TOPICS.items() <= found.items()
+    assert found["/cmd_vel"] == STAMPED
