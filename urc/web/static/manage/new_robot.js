@@ -49,6 +49,10 @@ async function look(form, next) {
   const host = valueOf(form, "host");
   const port = valueOf(form, "port");
   next.hidden = true;
+  if (host === "") return tell("[data-said]", `▲ ${t("Enter the address of the robot.")}`, true);
+  if (port !== "" && !(/^\d+$/.test(port) && Number(port) >= 1 && Number(port) <= 65535)) {
+    return tell("[data-said]", `▲ ${t("Port")}: ${t("a port, 1 to 65535")}`, true);
+  }
   lock(form, true);
   tell("[data-said]", t("looking for topics …"));
   try {
