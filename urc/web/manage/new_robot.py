@@ -140,7 +140,10 @@ class NewRobotRoutes:
         try:
             said = await body_of(request, NewRobot)
             if not self._manager.factory.robot_options.shows_installed:
-                raise ApiError(409, t("Start URC without a profile to add robots on this page."))
+                text = t(
+                    "To add robots on this page, start URC without a profile or with --installed."
+                )
+                raise ApiError(409, text)
             async with self._adding:
                 name = await self._add(said)
         except ApiError as refusal:
