@@ -84,7 +84,8 @@ async def test_a_robot_is_found_and_added_with_its_settings(line: str, tmp_path:
 async def test_what_the_page_refuses(tmp_path: Path) -> None:
     """A stranger, a robot that cannot be driven, an invalid topic, and an unused address."""
     async with running_managed(tmp_path) as address:
-        async with AsyncClient(base_url=address, cookies=person("Otto", "drive:*")) as client:
+        driver = person("Otto of the new robot", "drive")
+        async with AsyncClient(base_url=address, cookies=driver) as client:
             for path, body in (("topics", {"host": "127.0.0.1"}), ("robot", new_robot(1))):
                 reply = await client.post(
                     f"api/v1/new/{path}", json=body, headers={"origin": address.rstrip("/")}
