@@ -17,8 +17,10 @@ __all__ = ["FoxgloveTopics", "TopicWish"]
 
 MAX_GRAPH: Final = 4096
 """Maximum number of topics with known publishers, and of topics with known subscribers."""
-_NODES: Final = 64
+_NODES: Final = 16
 """Maximum number of nodes that are stored for each topic."""
+_NAME: Final = 256
+"""Maximum length of a stored name, in characters; longer names of topics are ignored."""
 
 
 class TopicWish(NamedTuple):
@@ -99,7 +101,9 @@ def _store(nodes: dict[str, tuple[str, ...]], listed: object, ids: str) -> None:
     """Store the nodes of each listed topic, up to the maximum number of topics."""
     for one in listed if isinstance(listed, list) else ():
         name = one.get("name") if isinstance(one, Mapping) else None
-        if isinstance(name, str) and (name in nodes or len(nodes) < MAX_GRAPH):
+        if not isinstance(name, str) or len(name) > _NAME:
+            continue
+        if name in nodes or len(nodes) < MAX_GRAPH:
             found = one.get(ids)
             told = found[:_NODES] if isinstance(found, list) else ()
-            nodes[name] = tuple(sorted({str(node) for node in told}))
+            nodes[name] = tuple(sorted({str(node)[:_NAME] for node in told}))
