@@ -28,8 +28,15 @@ export class TopicNotes {
   }
 }
 
-/** @param {TopicMismatch} mismatch */
-export function noteOf({ code, topic, found = "", wanted = "" }) {
+/**
+ * Return a mismatch as a note. Types are named without their package, unless only the packages
+ * differ, because a note has little room.
+ *
+ * @param {TopicMismatch} mismatch
+ */
+function noteOf({ code, topic, found: theirs = "", wanted: ours = "" }) {
+  const isClear = bare(theirs) !== bare(ours);
+  const [found, wanted] = isClear ? [bare(theirs), bare(ours)] : [theirs, ours];
   switch (code) {
     case "no-subscriber":
       return t("Nothing subscribes to {topic}", { topic });
@@ -44,4 +51,9 @@ export function noteOf({ code, topic, found = "", wanted = "" }) {
     default:
       return `${topic}: ${code}`;
   }
+}
+
+/** @param {string} type */
+function bare(type) {
+  return type.slice(type.lastIndexOf("/") + 1);
 }
