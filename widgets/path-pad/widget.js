@@ -29,6 +29,7 @@ export default {
     return {
       update({ x, y }, { go }) {
         pad.place(x, y);
+        pad.notice = go?.notice ?? "";
         pad.reason = go?.reason ?? ctx.t("no command is bound to this pad");
         pad.isAnswered = go?.isAnswered ?? false;
         pad.draw();
@@ -60,6 +61,8 @@ class PathPad {
     this.tolerance = Number(options["tolerance"] ?? 0.01);
     this.most = Number(options["points"] ?? 100);
     this.reason = ctx.t("not ready yet");
+    /** Why the command may have no effect, or "". */
+    this.notice = "";
     this.isAnswered = false;
     /** Drawn strokes, as fractions of the length. @type {Point[][]} */
     this.strokes = [];
@@ -222,7 +225,8 @@ class PathPad {
     attribute(this.go, "disabled", points.length > 1 && !this.isBusy && !reason ? null : "");
     for (const button of [this.undo, this.clear]) attribute(button, "disabled", isDrawn && !this.isBusy ? null : "");
     const hint = isDrawn ? t("check the path, then send or cancel it") : t("draw a path, or tap its points");
-    write(this.note, reason ? `◆ ${reason}` : outcome || hint);
+    const why = reason || (outcome ? "" : this.notice);
+    write(this.note, why ? `◆ ${why}` : outcome || hint);
   }
 
   drawDots() {

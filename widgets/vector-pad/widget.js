@@ -25,6 +25,7 @@ export default {
     pad.listen();
     return {
       update(_, { go }) {
+        pad.notice = go?.notice ?? "";
         pad.reason = go?.reason ?? ctx.t("no command is bound to this pad");
         if (pad.reason) pad.hold?.drop();
         pad.isAnswered = go?.isAnswered ?? false;
@@ -54,6 +55,8 @@ class VectorPad {
     this.step = Number(options["step"] ?? 0.1);
     this.isSentByRelease = options["send"] !== "button";
     this.reason = ctx.t("not ready yet");
+    /** Why the command may have no effect, or "". */
+    this.notice = "";
     this.isAnswered = false;
     /** Drawn vector as fractions of the length; null without a vector. @type {[number, number] | null} */
     this.at = null;
@@ -179,7 +182,8 @@ class VectorPad {
     attribute(this.end, "cy", (-x * RIM).toFixed(1));
     write(this.value, at ? this.words(x, y) : "—");
     for (const button of [this.go, this.clear]) attribute(button, "disabled", at && !this.isBusy && !reason ? null : "");
-    write(this.note, reason ? `◆ ${reason}` : this.outcome || ctx.t("drag to draw a vector, or tap its end"));
+    const why = reason || (this.outcome ? "" : this.notice);
+    write(this.note, why ? `◆ ${why}` : this.outcome || ctx.t("drag to draw a vector, or tap its end"));
   }
 
   /**
