@@ -47,6 +47,8 @@ _FARTHEST_M: Final = 4e7
 """Maximum distance between two frames in metres: the Earth's circumference."""
 _NORM_TOLERANCE: Final = 0.01
 """Tolerance for the squared norm of a quaternion, as in tf2."""
+_SEARCH_S: Final = 1.0
+"""Minimum time between two searches for old frames in a full tree, in seconds."""
 _REPORTED: Final = 3
 """Maximum number of rejected transforms of one message that are described."""
 
@@ -80,10 +82,13 @@ class TransformTree:
     def __init__(self) -> None:
         self.links: dict[str, StoredTransform] = {}
         """Newest transforms, keyed by the name of the child frame."""
+        self._searched_s = -math.inf
+        """Time of the last search for old frames, in seconds."""
 
     def clear(self) -> None:
         """Drop all frames; after a reconnection, old transforms would be wrong."""
         self.links.clear()
+        self._searched_s = -math.inf
 
     def update(self, raw: object, now: float, *, is_static: bool = False) -> list[str]:
         """Store the transforms of a message; return descriptions of rejected transforms.
@@ -161,6 +166,9 @@ class TransformTree:
     def _make_room(self, now: float) -> None:
         if len(self.links) < MAX_FRAMES:
             return
+        if now - self._searched_s < _SEARCH_S:
+            raise BadValue(f"the robot has more than {MAX_FRAMES} frames")
+        self._searched_s = now
         old = [
             name
             for name, one in self.links.items()
