@@ -122,6 +122,16 @@ def test_every_message_moves_the_pose_although_the_tree_is_sampled_rarely(tmp_pa
     assert robot.engine.deadline is None
 
 
+def test_the_last_transforms_of_a_burst_are_shown_in_a_live_session(tmp_path: Path) -> None:
+    """A link that knew of no short deadlines would not wake for the sample after a burst."""
+    robot = Robot(tmp_path)
+    robot.tf(1, stamped("map", "odom", (1, 0, 0)))
+    robot.tf(1.45, stamped("map", "odom", (2, 0, 0)))
+    assert robot.engine.deadline is not None
+    assert robot.engine.deadline - 1.45 >= robot.engine.calm_s
+    assert samples(robot.engine.tick(1.5))["frames"].value["frames"][1]["translation"][0] == 2
+
+
 def test_the_bridge_never_throttles_transforms(tmp_path: Path) -> None:
     """Several programs publish on /tf; a throttle in the bridge would drop most of them."""
     topics = listened(Robot(tmp_path).driver, "ros", {"host": "", "map": "map"})

@@ -60,6 +60,8 @@ def calm_s(driver: Driver) -> float:
         one.limits.is_timed or one.deadband or one.debounce_s for one in driver.signals.values()
     ):
         return 0.0
+    if any(one.type == "transform_tree" for one in driver.signals.values()):
+        return 0.0  # the next sample of the tree may be nearly due when a message arrives
     if any(spec.keepalive or spec.min_gap_s for spec in driver.transports.values()):
         return 0.0  # a gap may be nearly over when the next request arrives
     waits = [poll.every_s for poll in driver.polls]
