@@ -1,10 +1,15 @@
 """Transform trees: chains as in tf2's own tests, ages, bounds, and messages that lie."""
 
 import math
+import random
 from typing import Any
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from tests.unit.protocol.test_transforms import matrix, transforms
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.transform_tree import (
     CLOCK_JUMP_S,
@@ -101,6 +106,31 @@ def test_a_pose_goes_from_base_by_odom_to_map() -> None:
     assert place(made, "map", "base_link") == (9, 22)
     assert place(made, "map", "laser") == (9, 22.5)
     assert place(made, "/map", "/laser") == (9, 22.5)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 1000), transforms()), min_size=1, max_size=12),
+    st.randoms(use_true_random=False),
+)
+def test_chains_of_random_trees_are_products_of_matrices(
+    links: list[tuple[int, Transform]], dice: random.Random
+) -> None:
+    """numpy multiplies the matrices from each frame to the root; the messages arrive shuffled."""
+    parents = {at + 1: chosen % (at + 1) for at, (chosen, _) in enumerate(links)}
+    to_root = {0: np.eye(4)}
+    messages = []
+    for at, (_, one) in enumerate(links, 1):
+        to_root[at] = to_root[parents[at]] @ matrix(one)
+        messages.append(stamped(f"f{parents[at]}", f"f{at}", one[:3], one[3:], sec=None))
+    dice.shuffle(messages)
+    made = TransformTree()
+    for message in messages:
+        assert made.update({"transforms": [message]}, 1) == []
+    for target in to_root:
+        for source in to_root:
+            found, _ = made.lookup(f"f{target}", f"f{source}")
+            wanted = np.linalg.inv(to_root[target]) @ to_root[source]
+            np.testing.assert_allclose(matrix(found), wanted, atol=1e-4)
 
 
 def test_the_age_is_that_of_the_oldest_dynamic_transform() -> None:
