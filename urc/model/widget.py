@@ -61,6 +61,8 @@ class Widget(NamedTuple):
     """Inputs, outputs and options of which at least one is required; () means no such rule."""
     required_together: tuple[tuple[str, ...], ...] = ()
     """Groups of inputs or outputs that work only when all members of the group are bound."""
+    common_frame: tuple[str, ...] = ()
+    """Inputs whose values the widget shows in one coordinate frame."""
     min_cells: tuple[int, int] = (1, 1)
     """Minimum number of columns and rows that the widget needs in its slot."""
     footprint: Footprint = "instrument"

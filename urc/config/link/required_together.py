@@ -33,6 +33,7 @@ def link_together(
     _check_groups(part, widget, bound, problems)
     _check_instead(part, widget, bound, problems)
     _check_units(part, use, widget, driver, problems)
+    _check_frames(part, use, widget, driver, problems)
     _check_order(part, use, widget, problems)
     _check_local(part, widget, problems)
     _check_given(part, use, widget, driver, problems)
@@ -124,6 +125,34 @@ def _check_units(
                     " signal in that unit",
                 )
                 break
+
+
+def _check_frames(
+    part: Node, use: WidgetUse, widget: Widget, driver: Driver, problems: Problems
+) -> None:
+    """Warn about a binding in another coordinate frame than the widget's other bindings."""
+    mine = part.named("bind")
+    known: dict[str, tuple[str, str]] = {}
+    for port in widget.common_frame:
+        for name in (use.inputs[port],) if port in use.inputs else use.lists.get(port, ()):
+            signal = driver.signals.get(name)
+            if signal is not None and signal.frame is not None:
+                known[port] = name, signal.frame.source
+    if len({frame for _, frame in known.values()}) < 2:
+        return
+    first, *others = known
+    for port in others:
+        place = mine.get(port) or mine.get(first)
+        (name, frame), (base, wanted) = known[port], known[first]
+        if place is not None and frame != wanted:
+            problems.warn(
+                place,
+                "mixed-frames",
+                f"widget {widget.name!r} shows one coordinate frame, but {base!r} refers to"
+                f" {wanted!r} and {name!r} to {frame!r}",
+                hint="bind a signal with 'transform', which changes the value to that frame",
+            )
+            return
 
 
 def _units(use: WidgetUse, port: WidgetPort, driver: Driver) -> Iterator[tuple[str, str]]:

@@ -54,6 +54,7 @@ def parse_widget(document: Document, problems: Problems) -> Widget:
         required_together=tuple(
             tuple(map(str, inner.data)) for inner in part.listed("required_together")
         ),
+        common_frame=tuple(str(inner.data) for inner in part.listed("common_frame")),
     )
     _check_names(part, widget, problems)
     return widget
@@ -64,6 +65,7 @@ def _check_names(part: Node, widget: Widget, problems: Problems) -> None:
     ports, options = {**widget.inputs, **widget.outputs}, widget.options
     told: list[tuple[Node, Iterable[str]]] = []
     told += [(inner, (*ports, *options)) for inner in part.listed("at_least_one_of")]
+    told += [(inner, widget.inputs) for inner in part.listed("common_frame")]
     told += [
         (inner, ports) for group in part.listed("required_together") for inner in group.items()
     ]
