@@ -97,6 +97,9 @@ async def test_what_has_no_place_is_in_a_drawer_and_only_on_a_low_screen(
             await expect(page.locator(HANDLE)).to_be_hidden()
             await expect(page.locator(LIFT)).to_be_visible()
             await expect(page.locator("[data-drawer-head]")).to_be_hidden()
+        await turned(page, PHONE_LYING)
+        await expect(page.locator(HANDLE)).to_be_visible()
+        await expect(page.locator(LIFT)).to_be_hidden()
 
 
 async def test_a_control_in_the_drawer_is_released_when_it_closes_and_sticks_are_not(

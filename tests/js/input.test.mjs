@@ -137,3 +137,22 @@ test("what is given once is locked on a page that only watches, and what moves a
   const watches = "this page only watches";
   assert.deepEqual(locks({ ...free, drives: false }), [watches, watches]);
 });
+
+test("what is held in a part of the page is released, and nothing else", () => {
+  const { input } = held();
+  const [inside, outside] = [{}, {}];
+  const place = /** @type {any} */ ({ contains: (/** @type {object} */ el) => el === inside });
+  /** @type {string[]} */
+  const dropped = [];
+  const grip = (/** @type {string} */ name, /** @type {object} */ el) =>
+    /** @type {any} */ ({ spec: { el }, drop: (/** @type {string[]} */ kinds) => dropped.push(`${name} ${kinds}`) });
+  const gate = (/** @type {string} */ name, /** @type {object} */ el) =>
+    /** @type {any} */ ({ grip: grip(name, el), close: (/** @type {string} */ why) => dropped.push(`${name} ${why}`) });
+  input.grips.add(grip("lever", inside));
+  input.grips.add(grip("stick", outside));
+  input.gates.add(gate("gate", inside));
+  input.gates.add(gate("other gate", outside));
+  input.letGoIn(place, "closed");
+  const any = "pointer,keys,pad,stay";
+  assert.deepEqual(dropped, [`lever ${any}`, "gate closed", `gate ${any}`]);
+});

@@ -8,6 +8,8 @@
  */
 import { part } from "./badge.js";
 
+/** Screens with the drawer, as in drawer.css. */
+const SCREEN = "(height < 30rem) and (width >= 37.5rem)";
 /** Distance of a swipe that closes the drawer. */
 const SWIPE_PX = 40;
 /** A tap there leaves the drawer open: it is the other hand, which drives or stops. */
@@ -68,6 +70,8 @@ class Drawer {
     const pages = new MutationObserver(() => this.close()); // a tab, or the page with more widgets
     pages.observe(this.grid, { attributeFilter: ["data-page"] });
     signal.addEventListener("abort", () => pages.disconnect());
+    // On another screen, the cells are in the grid, and nothing is open.
+    matchMedia(SCREEN).addEventListener("change", () => this.close(), options);
   }
 
   /** @param {boolean} byPointer whether a finger or a mouse opened it, so that the focus stays */
