@@ -1,22 +1,31 @@
 // @ts-check
 /**
  * The legend of a small plot, which the style sheet lays out as a grid: the values that fit, and the
- * number of the others. A tap on the view shows all of them.
+ * number of the others. A tap on a view over a background enlarges the view; elsewhere, a tap on the
+ * legend shows all values in place of the curves.
  */
 import { style, write } from "urc/kit";
 
 export class SmallLegend {
   /**
+   * @param {HTMLElement} root element of the widget
    * @param {HTMLElement} list
    * @param {AbortSignal} signal
    */
-  constructor(list, signal) {
+  constructor(root, list, signal) {
     this.list = list;
     this.rest = document.createElement("li");
     this.rest.className = "plot-rest";
     this.rest.setAttribute("aria-hidden", "true");
     const sizes = new ResizeObserver(() => this.fit());
     sizes.observe(list);
+    const tap = (/** @type {Event} */ { target }) => {
+      if (target instanceof Element && target.closest("button")) return; // shows or hides a line
+      const isAll = !root.hasAttribute("data-values") && this.rest.isConnected;
+      root.toggleAttribute("data-values", isAll);
+      this.fit();
+    };
+    list.addEventListener("click", tap, { signal });
     signal.addEventListener("abort", () => sizes.disconnect());
   }
 

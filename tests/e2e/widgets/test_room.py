@@ -1,7 +1,7 @@
 """The room that widgets give to what matters, in the cells that pages really have."""
 
 import pytest
-from playwright.async_api import Page
+from playwright.async_api import Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until
@@ -122,6 +122,10 @@ async def test_a_small_plot_shows_the_values_that_fit_and_the_number_of_the_othe
         shown = await page.evaluate(ENTRIES)
         rest = await page.inner_text(".plot-rest")
         cut = await page.evaluate(CUT_VALUES)
+        await page.click(".plot-rest")
+        await expect(page.locator(".plot-entry:visible")).to_have_count(len(names))
+        await page.click(".plot-legend > li >> nth=0")
+        await expect(page.locator(".plot-rest")).to_have_text(rest)
     assert shown >= 1
     assert rest == f"+{len(names) - shown}"
     assert cut == []
