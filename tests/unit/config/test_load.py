@@ -59,7 +59,7 @@ class Checker:
 def test_puppet_becomes_the_model_that_it_describes() -> None:
     """The whole profile of the tutorial, value by value."""
     file = ROOT / "robots" / "puppet.yaml"
-    profile = load_profile(file, built_in_catalog(), WidgetFolder(SHELF))
+    profile = load_profile(file, built_in_catalog(), WidgetFolder(ROOT / "widgets"))
     wire = profile.driver.transports["wire"]
     (poll,) = profile.driver.polls
     discharged = "The battery is discharged."
@@ -94,15 +94,15 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
     assert poll.send == text("Give me the battery %")
     assert poll.reply is not None
     assert poll.reply.read.fields == ("battery",)
-    assert profile.slots == {
-        "battery": WidgetUse(
-            "battery", "battery", {"level": "battery"}, options={"show_number": True}
-        )
-    }
+    assert profile.slots["battery"] == WidgetUse(
+        "battery", "battery", {"level": "battery"}, options={"show_number": True}
+    )
+    assert profile.slots["charge"].lists == {"series": ("battery",)}
     assert profile.interfaces["default"].layouts == {
-        "landscape": Layout(3, 3, (Slot("battery", 1, 1),))
+        "landscape": Layout(1, 3, (Slot("battery", 0, 0), Slot("charge", 0, 1, 1, 2))),
+        "portrait": Layout(2, 1, (Slot("battery", 0, 0), Slot("charge", 1, 0))),
     }
-    assert list(profile.widgets) == ["battery"]
+    assert list(profile.widgets) == ["battery", "plot"]
     (test,) = profile.tests
     assert test == DocumentTest(
         name="a reply sets the battery",
