@@ -3,11 +3,11 @@
  * Rows of values and of diagnostics, and their order. Pure.
  *
  * @typedef {"error" | "warn" | "stale" | "unknown" | "ok"} Level
- * @typedef {{name: string, level: Level, message: string}} Row
+ * @typedef {{name: string, level: Level, message: string, values?: [string, string][], age?: number}} Row
  */
 
 /** Levels, worst first. @type {readonly Level[]} */
-const ORDER = ["error", "warn", "stale", "unknown", "ok"];
+export const ORDER = ["error", "warn", "stale", "unknown", "ok"];
 /** Levels by number, as in diagnostic_msgs/DiagnosticStatus. @type {readonly Level[]} */
 const NUMBERS = ["ok", "warn", "error", "stale"];
 /** @type {Record<string, Level>} */
@@ -25,7 +25,9 @@ const WORDS = {
   alarm: "error",
   stale: "stale",
 };
-const MOST_ROWS = 500;
+export const MOST_ROWS = 500;
+/** Largest number of values of one part. */
+const MOST_VALUES = 100;
 
 /**
  * @param {unknown} given a number as in ROS, or a word
@@ -62,8 +64,10 @@ function rowOf(name, given) {
     const level = levelOf(given);
     return { name, level, message: level === "unknown" ? text(given) : "" };
   }
-  const { level, name: own, message } = /** @type {Record<string, unknown>} */ (given);
-  return { name: text(own) || name, level: levelOf(level), message: text(message) };
+  const { level, name: own, message, values } = /** @type {Record<string, unknown>} */ (given);
+  const row = { name: text(own) || name, level: levelOf(level), message: text(message) };
+  if (!Array.isArray(values) || values.length === 0) return row;
+  return { ...row, values: values.slice(0, MOST_VALUES).map(pairOf) };
 }
 
 /**
@@ -81,6 +85,17 @@ export function rowsOfLists(levels, names, messages) {
     level: levelOf(levels[place]),
     message: text(messages[place]),
   }));
+}
+
+/**
+ * Return a diagnostic_msgs/KeyValue as a pair.
+ *
+ * @param {unknown} given
+ * @returns {[string, string]}
+ */
+function pairOf(given) {
+  const { key, value } = /** @type {Record<string, unknown>} */ (given ?? {});
+  return [text(key), text(value)];
 }
 
 /** @param {unknown} value */

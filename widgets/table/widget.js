@@ -4,13 +4,18 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 /** @typedef {import("./rows.js").Row} Row */
 /** @typedef {import("./rows.js").Level} Level */
+/** @typedef {import("./tree.js").Line} Line */
 /** @typedef {Readonly<Record<string, Reading>>} Readings */
-import { attribute, many, noteOf, part, worst, write } from "urc/kit";
-import { rowsOf, rowsOfLists, shown } from "./rows.js";
+import { ageText, attribute, many, noteOf, part, style, worst, write } from "urc/kit";
+import { Report } from "./report.js";
+import { rowsOfLists, shown } from "./rows.js";
+import { linesOf } from "./tree.js";
 import { keepWholeRows } from "./whole_rows.js";
 
 /** Minimum interval between redraws; readers of a table need no faster updates. */
 const EVERY_MS = 200;
+/** Interval at which the ages of diagnosed parts are checked. */
+const AGES_MS = 1000;
 
 class Table {
   /** @param {Context} ctx */
@@ -41,7 +46,21 @@ class Table {
     this.timer = 0;
     /** @type {Readings} */
     this.readings = {};
-    ctx.signal.addEventListener("abort", () => clearTimeout(this.timer));
+    this.report = new Report();
+    /** Serial number of the last report. */
+    this.serial = -1;
+    /** Branches that the operator has opened or closed, by path. @type {Map<string, boolean>} */
+    this.open = new Map();
+    this.isTree = ctx.options["view"] === "tree";
+    ctx.each("report", ({ value, time }) => this.report.take(value, time));
+    const ages = window.setInterval(() => {
+      if (this.report.parts.size > 0) this.take();
+    }, AGES_MS);
+    this.body.addEventListener("click", (event) => this.press(event), { signal: ctx.signal });
+    ctx.signal.addEventListener("abort", () => {
+      clearTimeout(this.timer);
+      clearInterval(ages);
+    });
   }
 
   /** @param {Readings} readings */
@@ -60,8 +79,11 @@ class Table {
     const { t } = this.ctx;
     const each = many(values);
     const list = (/** @type {Reading | undefined} */ reading) => (Array.isArray(reading?.value) ? reading.value : []);
+    if (report && report.serial !== this.serial) this.report.take(report.value, report.time);
+    if (report?.value === null) this.report.take(null, 0);
+    this.serial = report?.serial ?? -1;
     this.rows = [
-      ...rowsOf(report?.value),
+      ...this.report.rows(performance.now() / 1000, report?.signal.stale_after_s ?? 0),
       ...rowsOfLists(list(levels), list(names), list(messages)),
       ...each.map((reading) => rowOfReading(reading, t)),
     ];
@@ -71,9 +93,26 @@ class Table {
     this.draw();
   }
 
-  draw() {
+  /** Open or close a branch. @param {Event} event */
+  press(event) {
+    const button = event.target instanceof Element ? event.target.closest(".table-fold") : null;
+    const path = button?.closest("tr")?.getAttribute("data-path");
+    if (!button || path === null || path === undefined) return;
+    this.open.set(path, button.getAttribute("aria-expanded") !== "true");
+    this.draw();
+  }
+
+  /** @returns {Line[]} */
+  lines() {
     const { sort, least } = this.ctx.options;
-    const rows = shown(this.rows, { sort, least, filter: this.filter?.value ?? "" });
+    const filter = this.filter?.value ?? "";
+    if (this.isTree) return linesOf(shown(this.rows, { sort: "given", least, filter: "" }), this.open, { sort, filter });
+    const plain = { path: "", depth: 0, isParent: false, isOpen: false };
+    return shown(this.rows, { sort, least, filter }).map((row) => ({ ...row, ...plain }));
+  }
+
+  draw() {
+    const rows = this.lines();
     const worse = this.rows.filter(({ level }) => level === "error" || level === "warn").length;
     const { t } = this.ctx;
     // Old and missing values do not count as OK, even without a known problem.
@@ -86,14 +125,18 @@ class Table {
     rows.forEach((row, place) => {
       const line = this.body.children[place] ?? this.body.appendChild(emptyLine());
       attribute(line, "data-level", row.level);
+      attribute(line, "data-path", this.isTree ? row.path : null);
       const [level, name, message] = line.children;
-      if (level) writeLevel(level, this.words[row.level]);
-      if (name) write(name, row.name);
-      if (message) write(message, row.message);
+      if (level) writeLevel(level, row.level ? this.words[row.level] : "");
+      if (name && this.isTree) writeName(name, row);
+      else if (name) write(name, row.name);
+      const old = row.age ? t("{age} old", { age: ageText(row.age) }) : "";
+      if (message) write(message, [row.message, old].filter(Boolean).join(" · "));
     });
     const first = this.body.children[0];
     if (rows.length > 0 || !first) return;
     attribute(first, "data-level", "unknown");
+    attribute(first, "data-path", null);
     const texts = [this.rows.length === 0 ? "—" : "", this.rows.length === 0 ? "" : t("no row matches the filter"), ""];
     [...first.children].forEach((cell, place) => (place ? write : writeLevel)(cell, texts[place] ?? ""));
   }
@@ -114,6 +157,26 @@ function writeLevel(cell, text) {
   const [first, second] = cell.children;
   if (first) write(first, sign);
   if (second) write(second, words.length > 0 ? ` ${words.join(" ")}` : "");
+}
+
+/**
+ * Write the name of a part, as a button if there are lines below it.
+ *
+ * @param {Element} cell
+ * @param {Line} line
+ */
+function writeName(cell, { name, depth, isParent, isOpen }) {
+  const kind = isParent ? "button" : "span";
+  let inner = cell.firstElementChild;
+  if (inner?.localName !== kind) {
+    inner = document.createElement(kind);
+    inner.className = isParent ? "table-fold" : "table-leaf";
+    if (inner instanceof HTMLButtonElement) inner.type = "button";
+    cell.replaceChildren(inner);
+  }
+  if (inner instanceof HTMLElement) style(inner, "--depth", String(depth));
+  if (isParent) attribute(inner, "aria-expanded", String(isOpen));
+  write(inner, isParent ? `${isOpen ? "▾" : "▸"} ${name}` : name);
 }
 
 function emptyLine() {

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from playwright.async_api import Page
+from playwright.async_api import Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
@@ -229,6 +229,35 @@ async def test_a_table_shows_whole_rows_and_how_many_follow(new_page: PageMaker)
         await until_text(page, ".table-more", "")
         robot.set_reading("report", {"part 1": "ok"})
         await page.locator(".table-more").wait_for(state="hidden")
+
+
+async def test_diagnostics_of_several_programs_are_one_tree(new_page: PageMaker) -> None:
+    """A report in the same frame as another one is not lost; branches open by mouse and by keys."""
+    use = WidgetUse("table", "table", {"report": "report"}, options={"view": "tree"})
+    async with shown(new_page, use) as (robot, page):
+        wrist = {"level": 2, "name": "/arm/wrist", "message": "hot"}
+        robot.set_reading("report", {"status": [wrist, {"level": 0, "name": "/arm/elbow"}]})
+        values = [{"key": "rate", "value": "10 Hz"}]
+        robot.set_reading("report", {"status": [{"level": 0, "name": "lidar", "values": values}]})
+        await until_text(page, ".table-count", "1 not OK")
+        names = "(rows) => rows.map((row) => row.children[1].textContent)"
+        rows = page.locator(".table-body tr")
+        await expect(rows).to_have_count(4)
+        assert await rows.evaluate_all(names) == ["▾ arm", "wrist", "elbow", "▸ lidar"]
+        await page.click("text=▾ arm")
+        await expect(rows).to_have_count(2)
+        assert await rows.evaluate_all(names) == ["▸ arm", "▸ lidar"]
+        assert await rows.nth(0).get_attribute("data-level") == "error"
+        await page.focus("text=▸ lidar")
+        await page.keyboard.press("Enter")
+        await expect(rows).to_have_count(3)
+        assert await rows.evaluate_all(names) == ["▸ arm", "▾ lidar", "rate"]
+        assert await rows.nth(2).locator("td").nth(2).text_content() == "10 Hz"
+        # The next report leaves what the operator has opened and closed.
+        robot.set_reading("report", {"status": [{**wrist, "message": "very hot"}]})
+        await page.click("text=▸ arm")
+        await until_text(page, ".table-body tr:nth-child(2) td:nth-child(3)", "very hot")
+        await expect(rows).to_have_count(5)
 
 
 async def test_a_heading_is_chosen_and_then_sent(new_page: PageMaker) -> None:
