@@ -1,12 +1,14 @@
 // @ts-check
 /**
- * The robot's model: from its URDF file, or a box with a nose. Files are only from the profile. A mesh
+ * The robot's model: from its URDF, or a box with a nose. Files are only from the profile. A mesh
  * without a file is omitted and reported.
  *
  * @typedef {typeof import("three")} Three
  * @typedef {import("three").Object3D} Object3D
  * @typedef {{object: Object3D, joints: string[], set: (name: string, value: number) => void, missing: string[]}} Model
  */
+
+import { documentOf } from "./xml.js";
 
 /** Colour of parts without a material: visible in every theme. */
 const BARE = 0x7a858f;
@@ -41,16 +43,16 @@ export function box(three, [length = 0.6, width = 0.4, height = 0.2]) {
 
 /**
  * @param {Three} three
- * @param {string} url URL of the URDF file
+ * @param {{url: string} | {text: string}} source URL of the URDF file, or its text
  * @param {readonly string[]} meshes URLs of the meshes
  * @param {() => void} changed called for each loaded mesh
  * @returns {Promise<Model>}
  */
-export async function urdf(three, url, meshes, changed) {
+export async function urdf(three, source, meshes, changed) {
   const [{ default: URDFLoader }, { STLLoader }, page] = await Promise.all([
     import("urdf-loader"),
     import("three/addons/loaders/STLLoader.js"),
-    fetchXml(url),
+    "url" in source ? fetchXml(source.url) : documentOf(source.text),
   ]);
   if (!page.querySelector("robot > link")) throw new Error("the file holds no robot with links");
   /** @type {string[]} */

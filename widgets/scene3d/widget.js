@@ -89,6 +89,10 @@ class Scene {
     this.cloud = null;
     this.isReading = false;
     this.isCloudBad = false;
+    /** Description of the robot as URDF, or "". */
+    this.description = "";
+    /** Number of the newest model; an older one that loads late is dropped. */
+    this.loads = 0;
     const view = VIEWS.find((each) => each === options["view"]) ?? "orbit";
     try {
       this.stage = new ViewSwitch(three, Controls, this.face, { frames: Number(options["frames"] ?? 30), view });
@@ -155,8 +159,11 @@ class Scene {
     if (!stage) return;
     const size = Array.isArray(options["box"]) ? options["box"] : [];
     const file = options["urdf"];
+    const source = this.description ? { text: this.description } : typeof file === "string" && file ? { url: file } : null;
+    const turn = (this.loads += 1);
+    this.fault = "";
     let model = box(three, size);
-    if (typeof file === "string" && file) {
+    if (source) {
       const meshes = Array.isArray(options["meshes"]) ? options["meshes"].map(String) : [];
       const changed = () => {
         if (this.signal.aborted) return;
@@ -166,12 +173,12 @@ class Scene {
         this.tell();
       };
       try {
-        model = await urdf(three, file, meshes, changed);
+        model = await urdf(three, source, meshes, changed);
       } catch (error) {
         this.fault = error instanceof Error ? error.message : String(error);
       }
     }
-    if (this.signal.aborted) return;
+    if (this.signal.aborted || turn !== this.loads) return;
     this.model = model;
     stage.setModel(model.object);
     attribute(this.root, "data-model", model.joints.length > 0 || model.missing.length > 0 ? "urdf" : "box");
@@ -183,7 +190,14 @@ class Scene {
   /** @param {Readonly<Record<string, Reading>>} readings */
   update(readings) {
     this.readings = readings;
-    const all = Object.values(readings).flatMap((each) => (Array.isArray(each) ? each : [each]));
+    const text = readings["description"]?.value;
+    if (typeof text === "string" && text !== this.description) {
+      this.description = text;
+      void this.load();
+    }
+    // Robots send their description only once, so its age does not matter.
+    const shown = Object.entries(readings).filter(([name]) => name !== "description");
+    const all = shown.flatMap(([, each]) => each);
     // The worst bound reading determines the state.
     this.worst = all.reduce((/** @type {Reading | undefined} */ found, each) => worse(found, each), undefined);
     attribute(this.root, "data-state", this.worst?.state ?? "none");

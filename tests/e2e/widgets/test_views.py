@@ -415,6 +415,30 @@ async def test_a_model_bends_as_the_robot_does(new_page: PageMaker, tmp_path: Pa
         assert max(moved) > 20
 
 
+async def test_the_model_comes_from_the_description_that_the_robot_sends(
+    new_page: PageMaker,
+) -> None:
+    """A text that is no model is named, and the next one is shown."""
+    signals = {
+        "elbow": Signal("elbow", "number", unit="rad", stale_after_s=60),
+        "urdf": Signal("urdf", "string", stale_after_s=60),
+    }
+    use = WidgetUse("arm", "scene3d", {"description": "urdf"}, lists={"joint": ("elbow",)})
+    page = await new_page(size="desktop")
+    async with shown(page, signals, use) as robot:
+        await page.wait_for_selector(".scene3d[data-model='box']")
+        robot.set_reading("elbow", 0.0)
+        robot.set_reading("urdf", ARM)
+        await page.wait_for_selector(".scene3d[data-model='urdf']")
+        await until_text(page, ".scene3d-joints", "joints: 1")
+        robot.set_reading("urdf", "<robot")
+        await page.wait_for_selector(".scene3d[data-model='box']")
+        await until_text(page, ".scene3d-note", "▲ the model is no XML")
+        robot.set_reading("urdf", ARM)
+        await page.wait_for_selector(".scene3d[data-model='urdf']")
+        await until_text(page, ".scene3d-note", "")
+
+
 ARM = """\
 <robot name="arm">
   <link name="base"><visual><geometry><box size="0.4 0.4 0.2"/></geometry></visual></link>
