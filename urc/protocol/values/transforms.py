@@ -89,6 +89,8 @@ def transform_pose(transform: Transform, pose: object) -> tuple[float | None, ..
 def transform_points(transform: Transform, points: object) -> list[float]:
     """Return points on the ground in another frame: x and y in turn, as in `points`.
 
+    The numbers are rounded to 0.1 mm: pages receive them as text, and a scan has hundreds.
+
     Raises:
         BadValue: `points` is not a list of x and y in turn.
     """
@@ -100,8 +102,8 @@ def transform_points(transform: Transform, points: object) -> list[float]:
     c, d = 2 * (qx * qy + qz * qw), 1 - 2 * (qx * qx + qz * qz)
     xs, ys = numbers[::2], numbers[1::2]
     found = [0.0] * len(numbers)
-    found[::2] = [tx + a * x + b * y for x, y in zip(xs, ys, strict=True)]
-    found[1::2] = [ty + c * x + d * y for x, y in zip(xs, ys, strict=True)]
+    found[::2] = [round(tx + a * x + b * y, 4) for x, y in zip(xs, ys, strict=True)]
+    found[1::2] = [round(ty + c * x + d * y, 4) for x, y in zip(xs, ys, strict=True)]
     return found
 
 
