@@ -45,9 +45,9 @@ async def test_a_route_is_followed_in_order_and_stop_ends_it_after_a_lost_connec
     ):
         settings = {**usual, "host": "127.0.0.1", "port": near}
         async with Session(profile, settings, built_in_catalog().transports) as session:
-            await until(
-                session, lambda: None not in (value(session, "map_x"), value(session, "offset_x"))
-            )
+            # The localisation's first pose comes after the first transforms.
+            known = ("map_x", "covariance")
+            await until(session, lambda: None not in [value(session, one) for one in known])
             x, y = place(session)
             route = {"xs": [x + 0.3, x + 0.3, x + 0.6], "ys": [y, y + 0.3, y + 0.3]}
             await session.command("follow", route)
