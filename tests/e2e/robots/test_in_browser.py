@@ -54,7 +54,7 @@ ORDER = {
 }
 """What must come before the other commands, which follow as they are declared."""
 LAST = {"ur-e-series": ["power_off"]}
-NAVIGATION = {"navigate", "stop_navigation", "place"}
+NAVIGATION = {"navigate", "stop_navigation", "place", "follow", "stop_route"}
 """Commands for Nav2, which `tests.e2e.test_navigation` gives on the map."""
 WITHOUT = {
     "generic-ros2": NAVIGATION,
