@@ -62,8 +62,9 @@ WITHOUT = {
 }
 """Commands that are not given here. The docking of an emulated robot ends at once, and what has
 ended cannot be given up."""
-ON_THE_WAY = {"plan", "goal_x", "goal_y"}
+ON_THE_WAY = {"plan", "goal_x", "goal_y", "waypoint"}
 LOCALISED = {"floor", "costs", "covariance", "offset_x", "offset_y", "offset_yaw"}
+LOCALISED |= {"footprint", "particles"}
 SILENT = {
     "turtlebot4": ON_THE_WAY,
     "generic-ros2": ON_THE_WAY | LOCALISED | {f"offset_q{axis}" for axis in "xyzw"},
