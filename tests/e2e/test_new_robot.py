@@ -119,6 +119,7 @@ async def test_an_address_becomes_a_driven_robot_within_a_minute(
         hand.begin()
         await hand.tap(page.get_by_role("link", name="New ROS robot"))
         await page.locator("[name='host']").wait_for()
+        await expect(page.locator("[data-choose]")).to_be_hidden()
         await page.locator("[name='host']").fill("127.0.0.1")
         await page.locator("[name='port']").fill(str(base.port))
         hand.keys += len(f"127.0.0.1{base.port}") + 1

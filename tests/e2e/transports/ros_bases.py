@@ -16,6 +16,7 @@ import numpy as np
 from foxglove import Channel, Schema
 from foxglove.websocket import ConnectionGraph
 from PIL import Image
+from rosbags.serde import SerdeError
 from websockets.asyncio.client import connect
 
 from bench.rig.ros_messages import ROS2, RandomMessages
@@ -95,11 +96,17 @@ class Base:
     def __init__(self, line: str, port: int) -> None:
         self.line, self.port = line, port
         self.speeds: list[float] = []
+        self.unread = 0
+        """Number of commands of another type."""
 
     def hear(self, data: bytes) -> None:
         """Note the speed in a command that arrived as CDR."""
-        message: Any = ROS2.deserialize_cdr(data, STAMPED)
-        self.speeds.append(message.twist.linear.x)
+        try:
+            message: Any = ROS2.deserialize_cdr(data, STAMPED)
+        except SerdeError:
+            self.unread += 1
+        else:
+            self.speeds.append(message.twist.linear.x)
 
 
 @asynccontextmanager

@@ -43,11 +43,11 @@ function noteOf({ code, topic, found: theirs = "", wanted: ours = "" }) {
     case "no-publisher":
       return t("Nothing publishes {topic}", { topic });
     case "takes-type":
-      return t("{topic} carries {found}, but the profile sends {wanted}", { topic, found, wanted });
+      return t("{topic} takes {found}, not {wanted}", { topic, found, wanted });
     case "carries-type":
-      return t("{topic} carries {found}, but the profile expects {wanted}", { topic, found, wanted });
+      return t("{topic} carries {found}, not {wanted}", { topic, found, wanted });
     case "ros-version":
-      return t("This is ROS {found}, but the profile is for ROS {wanted}", { found, wanted });
+      return t("This is ROS {found}, not ROS {wanted}", { found, wanted });
     default:
       return `${topic}: ${code}`;
   }
