@@ -154,7 +154,7 @@ export class Motion {
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
     if (!note && this.notice) note = `◆ ${this.notice}`;
     // The notice replaces the values, which would look as if the robot moved.
-    attribute(this.root, "data-notice", this.notice && phase === "held" ? "yes" : null);
+    attribute(this.root, "data-notice", this.notice ? "yes" : null);
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
     // A stopped or refused gesture moves nothing, so the control is drawn at rest under the finger.
