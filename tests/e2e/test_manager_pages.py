@@ -375,7 +375,7 @@ async def test_the_pages_are_for_everybody(new_page: PageMaker, shop: Shop, tmp_
     shutil.copytree(shop.folders[True, "full"], data)
     async with running_managed(data) as address:
         page = await prepare(await new_page(size="phone"))
-        for path in ("", "drivers", "interfaces", "new", "robots/rover/settings"):
+        for path in ("", "drivers", "interfaces", "robots/rover/settings"):
             await page.goto(f"{address}{path}")
             if path in MANAGERS:
                 await expect(page.locator("[data-available] li").first).to_be_visible()
