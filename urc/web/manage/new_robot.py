@@ -98,8 +98,8 @@ class NewRobotRoutes:
             Nav("new", self._ways),
             {
                 "cmd_vel": t("Commands"),
-                "odom": t("Position"),
-                "scan": t("Laser"),
+                "odom": t("Position of the robot"),
+                "scan": t("Laser scanner"),
                 "camera": t("Camera"),
                 "battery": t("Battery"),
                 "map": t("Map"),
