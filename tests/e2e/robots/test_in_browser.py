@@ -62,13 +62,10 @@ WITHOUT = {
 }
 """Commands that are not given here. The docking of an emulated robot ends at once, and what has
 ended cannot be given up."""
-ON_THE_WAY = {"plan", "goal_x", "goal_y", "waypoint"}
-LOCALISED = {"floor", "costs", "covariance", "offset_x", "offset_y", "offset_yaw"}
-LOCALISED |= {"footprint", "particles"}
-SILENT = {
-    "turtlebot4": ON_THE_WAY,
-    "generic-ros2": ON_THE_WAY | LOCALISED | {f"offset_q{axis}" for axis in "xyzw"},
-}
+ON_THE_WAY = {"plan", "plan_frame", "map_plan", "goal_x", "goal_y", "waypoint"}
+LOCALISED = {"floor", "costs", "covariance", "footprint", "particles"}
+PLACED = {"frames", "map_pose", "map_laser", "first_ray"}
+SILENT = {"turtlebot4": ON_THE_WAY, "generic-ros2": ON_THE_WAY | LOCALISED | PLACED}
 """Signals without a value: no goal is given, and the setting for Nav2 is off by default."""
 
 
