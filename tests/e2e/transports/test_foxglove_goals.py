@@ -13,7 +13,7 @@ import urc
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from tests.e2e.transports.peers.foxglove_action import (
     ABORTED,
-    ACCEPTED,
+    REJECTED,
     UNKNOWN,
     RouteAction,
 )
@@ -171,8 +171,9 @@ async def test_a_lost_cancellation_is_sent_again_on_the_next_connection(
             cut()
             with pytest.raises(CommandFailed):
                 await following
-            await until(lambda: action.cancels)
-            assert action.cancels == [(goal, ACCEPTED)]
+            await until(lambda: len(action.cancels) == 2)
+            assert {one for one, _ in action.cancels} == {ALL, goal}
+            assert action.running == []
     finally:
         action.end_all()
 
@@ -205,6 +206,38 @@ async def test_a_goal_that_a_frozen_bridge_delivers_after_stop_is_ended(
             assert action.running == []
     finally:
         action.end_all()
+
+
+async def test_stop_ends_goals_of_an_action_that_appears_long_after_it(
+    rover: FoxgloveRobot,
+) -> None:
+    """STOP comes first. The bridge finds the action seconds later; another program drives."""
+    async with connected(rover.port) as robot:
+        await robot.command("stop_route")
+        await asyncio.sleep(2.5)
+        action = RouteAction(rover)
+        try:
+            await until(lambda: action.cancels)
+            assert action.cancels == [(ALL, UNKNOWN)]
+            await asyncio.sleep(1.5)
+            assert len(action.cancels) == 1, "an answered cancellation is not repeated"
+        finally:
+            action.end_all()
+
+
+async def test_a_refused_cancellation_is_repeated_until_the_robot_ends_the_route(
+    rover: FoxgloveRobot,
+) -> None:
+    async with acting(rover) as (action, robot):
+        following = await started(action, robot)
+        action.refuses = True
+        await robot.command("stop_route")
+        await until(lambda: len(action.cancels) >= 4)
+        assert {code for _, code in action.cancels} == {REJECTED}
+        assert action.running
+        action.refuses = False
+        with pytest.raises(CommandFailed, match="the action was cancelled"):
+            await following
 
 
 async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -> None:

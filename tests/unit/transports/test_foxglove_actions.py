@@ -14,9 +14,9 @@ from urc.model.driver import STOPPED
 from urc.model.payload import Envelope
 from urc.protocol.ros.topic_codec import TopicCodec
 from urc.transports.base import NOTICE
-from urc.transports.ros.foxglove_actions import HIDDEN, MAX_CANCELS
+from urc.transports.ros.foxglove_actions import HIDDEN
 from urc.transports.ros.foxglove_session import FoxgloveSession
-from urc.transports.ros.goals import UnfinishedGoals
+from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
 
@@ -35,15 +35,16 @@ class Bridge:
 
     def __init__(self, goals: UnfinishedGoals | None = None, encoding: str = "cdr") -> None:
         self.queue = TopicReceiveQueue()
-        self.later: list[Callable[[], None]] = []
+        self.later: list[tuple[float, Callable[[], None]]] = []
+        self.now_s = 0.0
         self.codec = TopicCodec()
         self.encoding = encoding
         self.session = FoxgloveSession(
             self.queue,
             (),
             TopicGraph(lambda _: None, 2),
-            call_at=lambda _, work: self.later.append(work),
-            clock=lambda: 0.0,
+            call_at=lambda at_s, work: self.later.append((at_s, work)),
+            clock=lambda: self.now_s,
             published={},
             goals=goals,
         )
@@ -63,6 +64,16 @@ class Bridge:
             assert number < 3
         self.hear({"op": "advertiseServices", "services": services})
         return self
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass, and run what becomes due."""
+        until_s = self.now_s + seconds
+        while due := [one for one in self.later if one[0] <= until_s]:
+            first = min(due, key=lambda one: one[0])
+            self.later.remove(first)
+            self.now_s = first[0]
+            first[1]()
+        self.now_s = until_s
 
     def hear(self, said: dict[str, Any]) -> None:
         self.session.arrived(json.dumps(said).encode())
@@ -114,7 +125,8 @@ class Bridge:
         """Return the goal id and the call of each cancellation since the last time."""
         found = []
         for name, call, data in self.sent():
-            assert name == "cancel_goal"
+            if name != "cancel_goal":
+                continue
             message = STORE.deserialize_cdr(data, "action_msgs/msg/CancelGoal_Request")
             assert message.goal_info.stamp.sec == message.goal_info.stamp.nanosec == 0
             found.append((bytes(message.goal_info.goal_id.uuid).hex(), call))
@@ -122,13 +134,22 @@ class Bridge:
 
 
 ALL = "0" * 32
+INFO = STORE.types["action_msgs/msg/GoalInfo"](
+    goal_id=STORE.types["unique_identifier_msgs/msg/UUID"](uuid=np.ones(16, dtype=np.uint8)),
+    stamp=STORE.types["builtin_interfaces/msg/Time"](sec=1, nanosec=2),
+)
 YES = b"\0\1\0\0\1"
 NO = b"\0\1\0\0\0"
 
 
 def code(number: int) -> bytes:
+    """Return the reply of rclcpp, which lists the goals that it now cancels."""
+    return answer(number, [INFO] if number == 0 else [])
+
+
+def answer(number: int, cancelling: list[Any]) -> bytes:
     name = "action_msgs/msg/CancelGoal_Response"
-    said = STORE.types[name](return_code=number, goals_canceling=[])
+    said = STORE.types[name](return_code=number, goals_canceling=cancelling)
     return bytes(STORE.serialize_cdr(said, name))
 
 
@@ -204,65 +225,174 @@ def test_a_goal_that_the_robot_accepts_after_its_cancellation_is_cancelled_again
     assert [name for name, _ in bridge.cancelled()] == [goal]
 
 
+def test_a_goal_that_is_accepted_long_after_stop_is_cancelled_at_once() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.session.perform(CANCEL)
+    for _ in range(60):
+        for _, one in bridge.cancelled():
+            bridge.reply(one, code(2))
+        bridge.advance(1)
+    bridge.cancelled()
+    bridge.reply(call, YES)
+    assert [name for name, _ in bridge.cancelled()] == [goal]
+    bridge.advance(1)
+    assert [name for name, _ in bridge.cancelled()] == [goal], "the repetitions begin anew"
+
+
+@pytest.mark.parametrize("number", [0, 2, 3])
+def test_a_reply_that_comes_before_the_acceptance_ends_no_cancellation(number: int) -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.session.perform(CANCEL)
+    for _, one in bridge.cancelled():
+        bridge.reply(one, code(number))
+    bridge.reply(call, YES)
+    ((name, one),) = bridge.cancelled()
+    assert name == goal
+    bridge.reply(one, code(0))
+    bridge.advance(60)
+    assert bridge.cancelled() == []
+
+
+def test_an_accepted_goal_that_newer_goals_displaced_is_still_cancelled() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    for _ in range(MAX_GOALS):
+        bridge.start()
+    bridge.session.perform(CANCEL)
+    assert goal not in [name for name, _ in bridge.cancelled()]
+    bridge.reply(call, YES)
+    assert [name for name, _ in bridge.cancelled()] == [goal]
+
+
 def test_an_unknown_goal_is_cancelled_again_because_it_may_arrive_late() -> None:
     """A frozen bridge delivers the goal of a lost connection after the cancellation."""
     goals = UnfinishedGoals()
     _, goal = Bridge(goals).offer().start()
     goals.cancel("/dock")
     later = Bridge(goals).offer()
-    for attempt in range(MAX_CANCELS):
-        ((name, call),) = later.cancelled()
+    (every, call), (name, one) = later.cancelled()
+    assert (every, name) == (ALL, goal)
+    later.reply(call, code(0))
+    for wait_s in (1, 2, 4, 8, 10, 10, 10):
+        later.reply(one, code(2))
+        later.advance(wait_s - 0.1)
+        assert later.cancelled() == []
+        later.advance(0.1)
+        ((name, one),) = later.cancelled()
         assert name == goal
-        later.reply(call, code(0 if attempt == 3 else 2))
-        if attempt == 3:
-            break
-        later.later.pop()()
-    assert later.later == []
-    assert goals.cancelled() == []
+    later.reply(one, code(0))
+    later.advance(60)
+    assert later.cancelled() == goals.cancelled() == []
 
 
-def test_cancellations_of_an_unknown_goal_end() -> None:
-    goals = UnfinishedGoals()
-    Bridge(goals).offer().start()
-    goals.cancel("/dock")
-    later = Bridge(goals).offer()
-    count = 0
-    while calls := later.cancelled():
-        count += 1
-        later.reply(calls[0][1], code(2))
-        later.later.pop()()
-    assert count == MAX_CANCELS
-    assert goals.cancelled(), "the next connection tries again"
+def test_a_bridge_that_does_not_reply_is_asked_again_without_end() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.reply(call, YES)
+    bridge.session.perform(CANCEL)
+    assert [name for name, _ in bridge.cancelled()] == [ALL, goal]
+    times_s = []
+    for _ in range(70):
+        bridge.advance(1)
+        if found := bridge.cancelled():
+            assert sorted(name for name, _ in found) == [ALL, goal]
+            times_s.append(bridge.now_s)
+    assert times_s == [1, 3, 7, 15, 25, 35, 45, 55, 65]
+    texts = [one.body for one in bridge.told() if one.verb == NOTICE]
+    head = "the cancellation of all goals of /dock failed and is repeated"
+    assert texts[0] == f"{head}: no reply within 1 s"
+    assert len(texts) == 10, "each wait is told once"
+
+
+def test_a_service_that_appears_again_is_asked_at_once() -> None:
+    bridge = Bridge().offer()
+    call, goal = bridge.start()
+    bridge.reply(call, YES)
+    bridge.session.perform(CANCEL)
+    for _ in range(40):
+        for _, one in bridge.cancelled():
+            bridge.hear({"op": "serviceCallFailure", "callId": one, "message": "not available"})
+        bridge.advance(1)
+    bridge.cancelled()
+    bridge.hear({"op": "unadvertiseServices", "serviceIds": [10, 11, 12]})
+    bridge.offer()
+    assert [name for name, _ in bridge.cancelled()] == [ALL, goal]
+    bridge.advance(1)
+    assert [name for name, _ in bridge.cancelled()] == [ALL, goal]
 
 
 def test_a_cancellation_that_fails_is_repeated_and_told() -> None:
     bridge = Bridge().offer()
-    call, goal = bridge.start()
-    bridge.reply(call, YES)
-    bridge.encode()
-    assert [name for name, _, _ in bridge.sent()] == ["get_result"]
     bridge.session.perform(CANCEL)
-    number = bridge.cancelled()[1][1]
-    bridge.hear({"op": "serviceCallFailure", "callId": number, "message": "timed out"})
+    ((_, call),) = bridge.cancelled()
+    bridge.hear({"op": "serviceCallFailure", "callId": call, "message": "timed out"})
     (notice,) = bridge.told()
-    assert notice == Envelope(NOTICE, {}, "a goal of /dock is not cancelled: timed out")
-    bridge.later.pop()()
-    assert [name for name, _ in bridge.cancelled()] == [goal]
+    text = "the cancellation of all goals of /dock failed and is repeated: timed out"
+    assert notice == Envelope(NOTICE, {}, text)
+    bridge.advance(1)
+    assert [name for name, _ in bridge.cancelled()] == [ALL]
     bridge.queue.end("lost")
-    bridge.later.clear()
+    bridge.advance(60)
+    assert bridge.sent() == []
 
 
-def test_a_refused_cancellation_is_told_and_not_repeated() -> None:
+@pytest.mark.parametrize("said", [answer(1, []), answer(0, [])], ids=["rclcpp", "rclpy"])
+def test_a_refused_cancellation_is_told_and_repeated(said: bytes) -> None:
     bridge = Bridge().offer()
-    call, _ = bridge.start()
+    call, goal = bridge.start()
     bridge.reply(call, YES)
     bridge.encode()
     bridge.sent()
     bridge.session.perform(CANCEL)
-    bridge.reply(bridge.cancelled()[1][1], code(1))
+    (_, every), (_, one) = bridge.cancelled()
+    bridge.reply(every, code(0))
+    bridge.reply(one, said)
     (notice,) = bridge.told()
-    assert notice.body == "the robot refused to cancel a goal of /dock"
-    assert bridge.later == []
+    assert notice.body == "the robot refused to cancel a goal of /dock; URC asks again"
+    bridge.advance(1)
+    ((name, one),) = bridge.cancelled()
+    assert name == goal
+    bridge.reply(one, code(0))
+    bridge.advance(60)
+    assert bridge.cancelled() == []
+
+
+def test_the_refused_cancellation_of_all_goals_is_told_and_repeated() -> None:
+    bridge = Bridge().offer()
+    bridge.session.perform(CANCEL)
+    bridge.reply(bridge.cancelled()[0][1], code(1))
+    (notice,) = bridge.told()
+    assert notice.body == "the robot refused to cancel all goals of /dock; URC asks again"
+    bridge.advance(1)
+    ((name, call),) = bridge.cancelled()
+    assert name == ALL
+    bridge.reply(call, code(2))
+    bridge.advance(60)
+    assert bridge.cancelled() == []
+
+
+def test_an_unanswered_cancellation_of_all_goals_is_repeated_on_the_next_connection() -> None:
+    goals = UnfinishedGoals()
+    Bridge(goals).offer().session.perform(CANCEL)
+    later = Bridge(goals).offer()
+    ((name, call),) = later.cancelled()
+    assert name == ALL
+    later.reply(call, code(0))
+    assert Bridge(goals).offer().cancelled() == []
+
+
+def test_a_new_goal_is_not_ended_by_the_cancellation_of_all_earlier_goals() -> None:
+    """A person has reset STOP; the robot has still not answered."""
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    bridge.session.perform(CANCEL)
+    assert [name for name, _ in bridge.cancelled()] == [ALL]
+    call, _ = bridge.start()
+    bridge.reply(call, YES)
+    bridge.advance(60)
+    assert bridge.cancelled() == Bridge(goals).offer().cancelled() == []
 
 
 @pytest.mark.parametrize(
@@ -333,7 +463,7 @@ def test_without_the_services_for_starting_and_cancelling_no_goal_is_sent(
         bridge.offer(*names)
     bridge.session.perform(DOCK._replace(attributes={"action": action, "id": 7}))
     assert bridge.told() == [], "the services may be announced a moment later"
-    bridge.later.pop()()
+    bridge.advance(1)
     (answer,) = bridge.told()
     assert (answer.attributes["ok"], answer.attributes["reason"]) == (False, expected)
     assert bridge.sent() == []
@@ -348,8 +478,7 @@ def test_a_goal_that_never_ends_is_cancelled_when_the_service_appears() -> None:
     assert later.sent() == []
     later.offer("cancel_goal")
     assert [name for name, _ in later.cancelled()] == [ALL, goal]
-    later.later.pop()()
-    assert later.told() == later.sent() == []
+    assert later.told() == []
 
 
 def test_a_restarted_server_cancels_goals_that_it_does_not_know() -> None:
@@ -360,23 +489,24 @@ def test_a_restarted_server_cancels_goals_that_it_does_not_know() -> None:
     assert [name for name, _ in bridge.cancelled()] == [ALL]
 
 
-def test_a_cancellation_does_not_wait_for_long() -> None:
+def test_a_cancellation_waits_for_its_service_and_says_so_once() -> None:
     bridge = Bridge()
     for _ in range(2):  # the second one adds no line to the log
         bridge.session.perform(CANCEL)
-        bridge.later.pop()()
+        bridge.advance(1)
     (notice,) = bridge.told()
-    expected = "no unfinished goal of /dock is known: none is cancelled"
-    assert notice == Envelope(NOTICE, {}, expected)
+    text = "the goals of /dock are not cancelled yet: the bridge offers no service for that"
+    assert notice == Envelope(NOTICE, {}, text)
+    bridge.advance(600)
     bridge.offer()
-    assert bridge.sent() == []
+    assert [name for name, _ in bridge.cancelled()] == [ALL]
 
 
 def test_a_goal_waits_for_its_services_and_stop_ends_the_wait() -> None:
     bridge = Bridge()
     bridge.session.perform(DOCK)
     bridge.offer()
-    bridge.later.pop()()
+    bridge.advance(1)
     bridge.encode()
     assert [name for name, _, _ in bridge.sent()] == ["send_goal"]
     other = Bridge()
@@ -384,11 +514,10 @@ def test_a_goal_waits_for_its_services_and_stop_ends_the_wait() -> None:
     other.session.perform(CANCEL)
     other.offer()
     assert [name for name, _ in other.cancelled()] == [ALL]
-    for work in other.later:
-        work()
-    (answer,) = other.told()
+    other.advance(1.0)
+    (answer,) = [one for one in other.told() if one.verb != NOTICE]
     assert answer.attributes["reason"] == "the action was cancelled"
-    assert other.sent() == []
+    assert {name for name, _, _ in other.sent()} == {"cancel_goal"}
 
 
 @pytest.mark.parametrize("data", [b"", b"\0\1\0\0", b"{", b'{"accepted":[]}'])

@@ -27,7 +27,7 @@ from typing import Any, Final
 from urc.model.payload import Envelope
 from urc.transports._faults import one_line
 from urc.transports.base import NOTICE, TOPICS, TransportError
-from urc.transports.ros.foxglove_actions import AGAIN_S, FoxgloveActions, feedback_of
+from urc.transports.ros.foxglove_actions import FoxgloveActions, feedback_of
 from urc.transports.ros.foxglove_frames import (
     AdvertisedChannel,
     BadOperation,
@@ -533,8 +533,8 @@ class FoxgloveSession:
 
     def call(
         self, service: ServiceType, data: bytes, done: Callable[[ServiceReply | None, str], None]
-    ) -> None:
-        """Call a service; `done` receives the reply, or None and the reason for a failure."""
+    ) -> int:
+        """Call a service and return the call's number; `done` receives the reply or a fault."""
         self._number += 1
         while len(self._own_calls) >= MAX_PENDING:
             del self._own_calls[next(iter(self._own_calls))]
@@ -542,6 +542,11 @@ class FoxgloveSession:
         frame = call_frame(service.id, self._number, service.request[1], data)
         self._frames.append((frame, False))
         self._flush()
+        return self._number
+
+    def forget_call(self, number: int) -> None:
+        """Ignore the reply to a call of `call` from now on."""
+        self._own_calls.pop(number, None)
 
     def return_unencoded(
         self, service: ServiceType, attributes: dict[str, object], body: object
@@ -557,14 +562,14 @@ class FoxgloveSession:
             self._told.add(text)
             self.queue.answer(Envelope(NOTICE, {}, text))
 
-    def repeat(self, work: Callable[[], None]) -> None:
-        """Run `work` after `AGAIN_S` seconds, unless the connection has ended."""
+    def repeat(self, work: Callable[[], None], after_s: float) -> None:
+        """Run `work` after `after_s` seconds, unless the connection has ended."""
 
         def run() -> None:
             if self.queue.ended is None:
                 work()
 
-        self._call_at(self._clock() + AGAIN_S, run)
+        self._call_at(self._clock() + after_s, run)
 
     # -- the parts that parameters need; see `RosapiCalls`
 

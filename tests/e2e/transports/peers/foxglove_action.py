@@ -92,6 +92,8 @@ class RouteAction:
         self._feedback: Channel | None = None
         self.goals: dict[str, Goal] = {}
         self.accepts = True
+        self.refuses = False
+        """Whether the robot refuses every cancellation."""
         self.missed: list[int] = []
         self.cancels: list[tuple[str, int]] = []
         """Goal id and return code of each cancellation; the id of all goals is zero."""
@@ -172,11 +174,18 @@ class RouteAction:
             known = self.goals.get(wanted)
             ending = [wanted] if wanted in self.running else []
             code = UNKNOWN if known is None else ACCEPTED if ending else TERMINATED
+        if self.refuses:
+            code, ending = REJECTED, []
         self.cancels.append((wanted, code))
         for goal in ending:
             self.finish(goal, CANCELED)
+        stamp = STORE.types["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
+        infos = [
+            STORE.types["action_msgs/msg/GoalInfo"](goal_id=_uuid(bytes.fromhex(one)), stamp=stamp)
+            for one in ending
+        ]
         response = STORE.types["action_msgs/msg/CancelGoal_Response"](
-            return_code=code, goals_canceling=[]
+            return_code=code, goals_canceling=infos
         )
         return _packed(response, "action_msgs/msg/CancelGoal_Response")
 
