@@ -3,7 +3,7 @@
 import asyncio
 import json
 from collections.abc import AsyncIterator, Callable
-from contextlib import asynccontextmanager, suppress
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -15,6 +15,7 @@ from urc.model.profile import Profile
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
 from urc.simulator.server import serve as serve_robot
+from urc.transports.ros import choice
 
 pytestmark = pytest.mark.anyio
 
@@ -87,6 +88,60 @@ async def test_stop_ends_a_goal_that_outlived_its_connection(
                     await asyncio.sleep(0.1)
             await until(session, lambda: value(session, "going") is False)
             assert not [note.text for note in session.hub.notes if "is cancelled" in note.text]
+
+
+async def test_a_cancellation_that_the_bridge_drops_is_repeated_on_the_same_connection(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER.replace("stale_after: 2s", "stale_after: 9s"))
+    rover = load_profile(path, built_in_catalog())
+    lost = asyncio.Event()
+    async with nothing_left(), emulated(rover) as port, cable(port, lost) as (near, _):
+        settings = {"host": "127.0.0.1", "port": near}
+        async with Session(rover, settings, built_in_catalog().transports) as session:
+            await until(session, lambda: value(session, "going") is False)
+            docking = asyncio.create_task(session.command("dock", {}))
+            await until(session, lambda: value(session, "going") is True)
+            lost.set()
+            await session.command("stop_docking", {})
+            await asyncio.sleep(0.3)
+            lost.clear()
+            with pytest.raises(CommandFailed, match="the action was cancelled"):
+                await docking
+            assert session.hub.links["ros"].state == "live"
+            await until(session, lambda: value(session, "going") is False)
+
+
+async def test_stop_ends_a_goal_that_was_sent_to_another_port_of_the_robot(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With `via: auto`, the bridge may come back on the port of the other kind."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER)
+    rover = load_profile(path, built_in_catalog())
+    path.write_text(DOCKER.replace('port: "{{ settings.port }}"', "via: auto"))
+    auto = load_profile(path, built_in_catalog())
+    async with (
+        nothing_left(),
+        emulated(rover) as port,
+        cable(port) as (second, _),
+        AsyncExitStack() as first_cable,
+    ):
+        first, cut = await first_cable.enter_async_context(cable(port))
+        monkeypatch.setitem(choice.PORTS, "auto", (first, second))  # type: ignore[arg-type]
+        settings = {"host": "127.0.0.1", "port": 1}
+        async with Session(auto, settings, built_in_catalog().transports) as session:
+            await until(session, lambda: value(session, "going") is False)
+            docking = asyncio.create_task(session.command("dock", {}))
+            await until(session, lambda: value(session, "going") is True)
+            cut()
+            await first_cable.aclose()
+            with pytest.raises(CommandFailed):
+                await docking
+            await until(session, lambda: session.hub.links["ros"].state == "live")
+            await session.command("stop_docking", {})
+            await until(session, lambda: value(session, "going") is False)
 
 
 async def test_the_emulated_bridge_takes_a_cancel_from_any_client_but_no_unknown_id(

@@ -58,11 +58,46 @@ def test_a_cancel_without_a_result_is_sent_again_on_the_next_connection() -> Non
     first = RosClient(TopicReceiveQueue(), 2, goals)
     ending, lasting = sent(first, DOCK) + sent(first, DOCK)
     sent(first, DOCK._replace(attributes={**DOCK.attributes, "action": "/undock"}))
-    assert first.cancel_again() == [], "nothing was cancelled yet"
+    assert first.cancel_due() == [], "nothing was cancelled yet"
+    assert first.cancel_wait_s() is None
     sent(first, CANCEL)
     first.arrived(ended(ending, 5), 100)
-    (again,) = map(json.loads, RosClient(TopicReceiveQueue(), 2, goals).cancel_again())
+    (again,) = map(json.loads, RosClient(TopicReceiveQueue(), 2, goals).cancel_due())
     assert again == {"op": "cancel_action_goal", "id": lasting["id"], "action": "/dock"}
+
+
+def test_a_cancel_is_repeated_until_the_result_arrives() -> None:
+    """The bridge drops a cancel that its thread handles before the thread of the goal."""
+    now_s = 100.0
+    client = RosClient(TopicReceiveQueue(), 2, UnfinishedGoals(), lambda: now_s)
+    (goal,) = sent(client, DOCK)
+    (cancel,) = sent(client, CANCEL)
+    times_s = []
+    for _ in range(460):
+        wait_s = client.cancel_wait_s()
+        assert wait_s is not None
+        frames = [json.loads(frame) for frame in client.cancel_due()]
+        assert frames in ([], [cancel])
+        assert bool(frames) == (wait_s == 0)
+        times_s += [now_s - 100] * bool(frames)
+        now_s += 0.125
+    assert times_s == [1, 3, 7, 15, 25, 35, 45, 55]
+    client.arrived(ended(goal, 5), 100)
+    now_s += 60
+    assert client.cancel_wait_s() is None
+    assert client.cancel_due() == []
+
+
+def test_a_goal_of_the_other_kind_of_bridge_is_not_cancelled_by_its_id() -> None:
+    goals = UnfinishedGoals()
+    goals.add("0f" * 16, "/dock")
+    client = RosClient(queue := TopicReceiveQueue(), 2, goals)
+    assert sent(client, CANCEL) == client.cancel_due() == []
+    (notice,) = told(queue)
+    assert notice.verb == NOTICE
+    assert goals.owes("/dock"), "foxglove_bridge ends it later"
+    sent(client, DOCK)
+    assert not goals.owes("/dock"), "the new goal must not be ended"
 
 
 @pytest.mark.parametrize("status", [4, 5, 6])

@@ -17,6 +17,7 @@ from urc.transports.ros.foxglove import DEFAULT_PORT as FOXGLOVE_PORT
 from urc.transports.ros.foxglove import FoxgloveTransport
 from urc.transports.ros.foxglove_frames import SUBPROTOCOLS
 from urc.transports.ros.foxglove_topics import TopicWish
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.rosbridge import RosbridgeTransport
 from urc.transports.ros.rosbridge_operations import MAX_BYTES
 from urc.transports.websocket import WebSocketTransport
@@ -182,12 +183,12 @@ def from_setup(setup: TransportSetup) -> Transport:
     )
     wishes = tuple(TopicWish(one.topic, one.type, one.throttle_ms / 1000) for one in wanted)
     declared = ros if isinstance(ros, int) else None
-    candidates = []
+    candidates, goals = [], UnfinishedGoals()  # STOP after a change of the bridge ends all goals
     for number in PORTS[via] if port is None else (port,):
         where = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
         wire = _wire(setup, where, offers=via != "rosbridge")
-        foxglove = FoxgloveTransport(wire, where, wishes, declared)
-        other = RosbridgeTransport(wire, where, wanted, ros)
+        foxglove = FoxgloveTransport(wire, where, wishes, declared, goals)
+        other = RosbridgeTransport(wire, where, wanted, ros, goals)
         if via == "rosbridge":
             return other
         if via == "foxglove":

@@ -2,7 +2,7 @@
 
 Theory of operation. Each connection is one WebSocket with pings, opened by URC's WebSocket
 transport. `FoxgloveSession` implements the protocol. The session is discarded with the connection,
-so no data can be sent late. Only the ids of unfinished goals are kept, so that a STOP after a
+so no data can be sent late. Only the record of unfinished goals is kept, so that a STOP after a
 reconnection cancels these goals. A task reads continuously, even if messages are consumed slowly,
 because the bridge drops a slow client's oldest data. Channels can appear and disappear. Changes are
 collected for `_SETTLE_S` seconds, because a broken robot may announce thousands of channels per
@@ -49,6 +49,7 @@ class FoxgloveTransport:
         where: str,
         wishes: tuple[TopicWish, ...] = (),
         ros: int | None = None,
+        goals: UnfinishedGoals | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -57,13 +58,14 @@ class FoxgloveTransport:
             where: target in readable form, such as ``192.168.1.5:8765``.
             wishes: topics to subscribe to, without duplicates.
             ros: ROS version declared in the document; None if undeclared.
+            goals: record of unfinished goals that other transports share; None for a new record.
         """
         self._wire = wire
         self._where = where
         self._wishes = wishes
         self._graph = TopicGraph(self._log, ros)
         self._published: dict[tuple[str, str], str] = {}
-        self._goals = UnfinishedGoals()
+        self._goals = UnfinishedGoals() if goals is None else goals
         self._session: FoxgloveSession | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._greeted = asyncio.Event()

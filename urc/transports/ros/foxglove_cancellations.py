@@ -21,7 +21,7 @@ from typing import Any, Final, Protocol
 
 from urc.transports._faults import one_line
 from urc.transports.ros.foxglove_frames import ServiceReply, ServiceType
-from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, longer
+from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
 
 __all__ = ["CANCEL_GOAL", "CancelCalls", "GoalCancellations", "first_value"]
 
@@ -165,8 +165,10 @@ class GoalCancellations:
         key = action, goal
         self._drop(key)
         service = self._calls.service(action + CANCEL_GOAL)
-        if service is None:
-            return  # `offered` sends it
+        if service is None:  # `offered` sends it
+            return
+        if not is_ros_id(goal):  # from rosbridge; ended by the cancellation of all goals
+            return
         attempt = self._attempts[key] = _Attempt(action, goal, wait_s)
         data = _cancellation(service, bytes.fromhex(goal))
         attempt.call = self._calls.call(

@@ -1,4 +1,4 @@
-"""The unfinished goals of one ROS bridge transport, kept across its connections.
+"""The unfinished goals of one ROS transport, kept across its connections and kinds of bridges.
 
 A bridge does not cancel a goal when the client's connection is lost, so the robot drives on. A goal
 can be cancelled by its id from any connection. The transport therefore keeps the ids: STOP
@@ -7,22 +7,32 @@ must also cancel a goal that was sent before a loss.
 The record also keeps the actions of which all goals are to be cancelled. The robot *owes* an answer
 to this cancellation. The cancellation is repeated, on later connections too, until the answer
 arrives or a new goal of the action is sent.
+
+With ``via: auto``, goals of both kinds of bridges are in one record. A bridge can only cancel goals
+that were sent through its own kind of bridge by their ids.
 """
 
+import re
 from typing import Final
 
-__all__ = ["FIRST_S", "MAX_GOALS", "UnfinishedGoals", "longer"]
+__all__ = ["FIRST_S", "MAX_GOALS", "UnfinishedGoals", "is_ros_id", "longer"]
 
 MAX_GOALS: Final = 64
 """Maximum number of kept goals, and of actions; above the limit, the oldest one is dropped."""
 FIRST_S: Final = 1.0
 """Time after which an unanswered cancellation is first repeated, in seconds."""
 _LONGEST_S: Final = 10.0
+_ROS_ID: Final = re.compile("[0-9a-f]{32}")
 
 
 def longer(wait_s: float) -> float:
     """Return the wait before the repetition after next, in seconds: twice as long, at most 10 s."""
     return min(2 * wait_s, _LONGEST_S)
+
+
+def is_ros_id(goal: str) -> bool:
+    """Return whether a goal's id is an id of ROS 2, in hex; the ids of rosbridge are names."""
+    return _ROS_ID.fullmatch(goal) is not None
 
 
 class UnfinishedGoals:

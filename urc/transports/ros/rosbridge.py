@@ -4,10 +4,12 @@ Theory of operation. Each connection is one WebSocket with pings, opened by URC'
 transport. The protocol over the WebSocket is implemented by roslibpy
 (`urc.transports.ros.rosbridge_client`). roslibpy's objects are discarded with the connection, so no
 data can be sent late. Only the ids of unfinished goals are kept, so that a STOP after a
-reconnection cancels these goals. A cancellation without a result is sent again on each new
-connection, because the lost connection may not have delivered it. A task reads continuously, even
-if messages are consumed slowly, because one stalled reader would freeze the topic for every client
-of the bridge.
+reconnection cancels these goals. A task reads continuously, even if messages are consumed slowly,
+because one stalled reader would freeze the topic for every client of the bridge.
+
+A cancellation is sent again until the goal's result arrives, on each later connection too. A bridge
+starts goals and cancellations in threads of their own. The bridge drops a cancellation that it
+handles before the goal, and confirms nothing.
 
 A bridge delivers the first message on a topic only after the bridge's publisher has connected to
 the subscribers. If the client disconnects before that moment, the bridge drops the message. Clients
@@ -75,6 +77,7 @@ class RosbridgeTransport:
         where: str,
         subscriptions: tuple[RosSubscription, ...] = (),
         ros: int | Literal["auto"] | None = None,
+        goals: UnfinishedGoals | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -84,6 +87,7 @@ class RosbridgeTransport:
             subscriptions: subscriptions to make whenever the connection opens, one per topic.
             ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
                 bridge's version; None to keep names as written.
+            goals: record of unfinished goals that other transports share; None for a new record.
         """
         self._wire = wire
         self._where = where
@@ -91,7 +95,7 @@ class RosbridgeTransport:
         self._ros = ros
         self._session: _Session | None = None
         self._graph = TopicGraph(self._log, None if ros == AUTO else ros)
-        self._goals = UnfinishedGoals()
+        self._goals = UnfinishedGoals() if goals is None else goals
 
     @property
     def address(self) -> str:
@@ -241,7 +245,11 @@ class _Session:
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
-        self._client = RosClient(self.queue, None if ros == AUTO else ros, goals)
+        clock = asyncio.get_running_loop().time
+        self._client = RosClient(self.queue, None if ros == AUTO else ros, goals, clock)
+        self._cancelled = asyncio.Event()
+        """Event that is set after goals were cancelled."""
+        self._canceller: asyncio.Task[None] | None = None
         self._is_auto = ros == AUTO
         self._frames = OperationReader(packed)
         self._packed = packed
@@ -262,7 +270,8 @@ class _Session:
         With ``version: auto``, wait up to `answer_s` seconds for the list before subscribing.
         """
         self._reader = asyncio.create_task(self._read())
-        await self._write(self._client.cancel_again())
+        await self._write(self._client.cancel_due())
+        self._canceller = asyncio.create_task(self._cancel_again())
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
@@ -292,7 +301,19 @@ class _Session:
                 self._fresh[topic] = None
             if self._learnt.is_set():
                 frames += self._look_at(topic, str(envelope.attributes.get("type") or ""))
+        if envelope.verb == "cancel":
+            self._cancelled.set()
         await self._write(frames)
+
+    async def _cancel_again(self) -> None:
+        """Repeat the cancellations of goals without results, until cancelled."""
+        with suppress(TransportError):  # the reader reports the end of the connection
+            while True:
+                self._cancelled.clear()
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(self._client.cancel_wait_s()):
+                        await self._cancelled.wait()
+                await self._write(self._client.cancel_due())
 
     def _look_at(self, topic: str, kind: str) -> list[bytes]:
         """Return the query for a topic's subscribers; [] after the topic's first message."""
@@ -368,7 +389,9 @@ class _Session:
     async def end(self) -> None:
         """Stop reading and wake all waiting tasks."""
         self.queue.end("the connection is closed")
-        tasks = [task for task in (self._reader, self._listing) if task is not None]
+        tasks = [
+            task for task in (self._reader, self._listing, self._canceller) if task is not None
+        ]
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)

@@ -12,6 +12,7 @@ The client does no I/O and uses no tasks or threads.
 """
 
 import secrets
+import time
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, cast
 
@@ -23,7 +24,7 @@ from urc.model.payload import Envelope
 from urc.model.values import NOTHING
 from urc.transports._faults import one_line
 from urc.transports.base import NOTICE, TransportError
-from urc.transports.ros.goals import UnfinishedGoals
+from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -53,7 +54,11 @@ class RosClient:
     """Converts between envelopes and rosbridge operations, for one connection."""
 
     def __init__(
-        self, queue: TopicReceiveQueue, ros: int | None, goals: UnfinishedGoals | None = None
+        self,
+        queue: TopicReceiveQueue,
+        ros: int | None,
+        goals: UnfinishedGoals | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """Initialise the state for a new connection.
 
@@ -61,6 +66,7 @@ class RosClient:
             queue: queue that receives messages and replies.
             ros: ROS version of type names; None keeps names as written.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
+            clock: monotonic clock, in seconds.
         """
         self._queue = queue
         self._ros_version = ros
@@ -70,6 +76,10 @@ class RosClient:
         self._topics: dict[str, Any] = {}
         self._services: dict[str, Any] = {}
         self._goals = UnfinishedGoals() if goals is None else goals
+        self._clock = clock
+        self._repeats: dict[str, tuple[float, float]] = {}
+        """Time of the next cancellation of each cancelled goal, and the wait after it, in seconds.
+        """
         self._listened: dict[str, tuple[RosSubscription, _Topic]] = {}
         """Topics that were subscribed on this connection."""
         self._told: set[str] = set()
@@ -116,11 +126,24 @@ class RosClient:
         known = self._listened.get(name)
         return [] if known is None or known[1].is_subscribed else self.listen(known[0])
 
-    def cancel_again(self) -> list[bytes]:
-        """Repeat the cancellations without results, which an earlier connection may have lost."""
-        for goal, action in self._goals.cancelled():
-            self._cancel_goal(goal, action)
+    def cancel_due(self) -> list[bytes]:
+        """Repeat the due cancellations without results; on a new connection, all are due."""
+        now_s = self._clock()
+        cancelled = self._cancelled()
+        self._repeats = {one: self._repeats.get(one, (now_s, FIRST_S)) for one in cancelled}
+        for goal, (at_s, wait_s) in tuple(self._repeats.items()):
+            if at_s <= now_s:
+                self._cancel_goal(goal, cancelled[goal], wait_s)
         return self._protocol.written()
+
+    def cancel_wait_s(self) -> float | None:
+        """Return the time until a cancellation is due, in seconds; None if nothing is cancelled."""
+        due_s = [self._repeats[one][0] for one in self._cancelled() if one in self._repeats]
+        return max(0.0, min(due_s) - self._clock()) if due_s else None
+
+    def _cancelled(self) -> dict[str, str]:
+        """Return the action of each cancelled goal without a result, keyed by goal id."""
+        return {one: name for one, name in self._goals.cancelled() if not is_ros_id(one)}
 
     def call_service(
         self,
@@ -202,12 +225,13 @@ class RosClient:
             feedback=lambda values: self._feedback(name, number, values),
             errback=lambda result: self._result(goal, number, False, result),
         )
+        self._goals.settle(name)
         self._goals.add(goal, name)
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
         """Cancel all unfinished goals of an action, including those of earlier connections."""
         name = _text(attributes, "action")
-        goals = self._goals.cancel(name)
+        goals = [one for one in self._goals.cancel(name) if not is_ros_id(one)]
         for goal in goals:
             self._cancel_goal(goal, name)
         if not goals and name not in self._told and len(self._told) < KNOWN_TOPICS:
@@ -217,7 +241,8 @@ class RosClient:
             )
             self._queue.answer(Envelope(NOTICE, {}, text))
 
-    def _cancel_goal(self, goal: str, action: str) -> None:
+    def _cancel_goal(self, goal: str, action: str, wait_s: float = FIRST_S) -> None:
+        self._repeats[goal] = self._clock() + wait_s, longer(wait_s)
         ActionClient(self._ros, action, "", reconnect_on_close=False).cancel_goal(goal)
 
     # -- receiving
