@@ -4,7 +4,8 @@ Theory of operation. The guard's state is lost when the guard process dies. The 
 keeps a table of all held commands that were armed or stopped. Each entry stores the command's terms
 and whether the robot may still be moving because of the command. A new guard is initialised from
 this table. The new guard receives the list of transports, and a pending stop for each command that
-may be moving the robot. The new guard also receives the terms of other armed commands. For each
+may be moving the robot. The list contains the ROS goals that the robot may still follow, so that
+STOP ends these goals, too. The new guard also receives the terms of other armed commands. For each
 pending stop, the guard opens the connection and writes the stop first. After a restart of the
 guard, motion never resumes automatically.
 
@@ -20,12 +21,15 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
+from msgspec.structs import replace
+
 from urc.guard import messages
 from urc.guard.channel import Channel, ChannelListener, GuardedLineSpec
 from urc.guard.proxy import GuardedTransport, Stands
 from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
 from urc.motion.hold_to_run import HoldTerms, HoldToRun, StopReport
 from urc.problems import UrcError
+from urc.transports.base import GoalRecord
 
 __all__ = ["GuardClient", "HeldSpec"]
 
@@ -102,6 +106,8 @@ class GuardClient:
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
         """Table of all commands that are armed or may be moving the robot."""
+        self._goals: dict[str, GoalRecord] = {}
+        """Unfinished goals of each transport, as last reported by the guard."""
         self._stops: deque[tuple[str, StopReport]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -247,7 +253,8 @@ class GuardClient:
     def briefing(self) -> Iterator[messages.ToGuard]:
         """Yield the messages that initialise a new guard: pending stops, then armed controls."""
         for spec in self.lines:
-            yield spec.make
+            goals = self._goals.get(spec.make.line)
+            yield spec.make if goals is None else replace(spec.make, goals=goals)
         for command, control in self._controls.items():
             control.number, control.first = 0, 1
             if control.may_move:
@@ -262,6 +269,8 @@ class GuardClient:
             self._record_stop(message)
         elif isinstance(message, messages.StopDue):
             self._record_due(message.control)
+        elif isinstance(message, messages.GoalsChanged):
+            self._goals[message.line] = message.record
         elif not isinstance(message, messages.Heartbeat):
             self.transports[message.line].handle(message, size)
             if isinstance(message, messages.LineLost | messages.LineClosed):

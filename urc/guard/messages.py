@@ -12,6 +12,7 @@ import msgspec
 
 from urc.model.payload import Count, Numbered, Payload
 from urc.motion.hold_to_run import HoldTerms, Reason
+from urc.transports.base import GoalRecord
 
 __all__ = [
     "ArmControl",
@@ -21,6 +22,7 @@ __all__ = [
     "CountersAdvanced",
     "FlowCredit",
     "FromGuard",
+    "GoalsChanged",
     "LineLost",
     "MakeTransport",
     "OpenLine",
@@ -66,6 +68,8 @@ class MakeTransport(msgspec.Struct, array_like=True, frozen=True, tag=1):
     silent_s: float | None = None
     """Maximum silence of a moving robot before the connection is reset, in seconds; None means
     unlimited."""
+    goals: GoalRecord = GoalRecord()
+    """Goals that an earlier guard has started or cancelled."""
 
 
 class OpenLine(msgspec.Struct, array_like=True, frozen=True, tag=2):
@@ -264,6 +268,13 @@ class SendStale(msgspec.Struct, array_like=True, frozen=True, tag=31):
     stand: dict[str, int]
 
 
+class GoalsChanged(msgspec.Struct, array_like=True, frozen=True, tag=33):
+    """A transport's unfinished goals or cancellations have changed; sent before a new goal is."""
+
+    line: str
+    record: GoalRecord
+
+
 ToGuard = (
     MakeTransport
     | OpenLine
@@ -290,6 +301,7 @@ FromGuard = (
     | Heartbeat
     | CountersAdvanced
     | SendStale
+    | GoalsChanged
 )
 
 

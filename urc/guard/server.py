@@ -9,7 +9,13 @@ from typing import Any, Final
 from urc.guard import messages
 from urc.guard.guarded_connection import Emit, GuardedConnection
 from urc.guard.send_queue import LaneClock
-from urc.transports.base import TopicSubscription, Transport, TransportSetup
+from urc.transports.base import (
+    GoalRecord,
+    SupportsGoals,
+    TopicSubscription,
+    Transport,
+    TransportSetup,
+)
 
 __all__ = ["FINISH_S", "GuardServer"]
 
@@ -77,6 +83,12 @@ class GuardServer:
 
     def add(self, said: messages.MakeTransport, transport: Transport) -> None:
         """Add a transport, whose connection the engine can then open."""
+        if isinstance(transport, SupportsGoals):
+
+            def changed(record: GoalRecord) -> None:
+                self._emit(messages.GoalsChanged(said.line, record))
+
+            transport.keep_goals(said.goals, changed)
         self._lines[said.line] = GuardedConnection(said, transport, self._emit, self._clock)
 
     def _send(self, said: messages.SendBytes) -> None:

@@ -14,6 +14,7 @@ from urc.model.values import NOTHING, Value
 from urc.problems import UrcError
 
 __all__ = [
+    "GoalRecord",
     "NOTICE",
     "TOPICS",
     "ByteStream",
@@ -26,6 +27,7 @@ __all__ = [
     "SupportsAbort",
     "SupportsEnd",
     "SupportsForget",
+    "SupportsGoals",
     "SupportsOffer",
     "SupportsProbe",
     "SupportsReady",
@@ -235,6 +237,29 @@ class Prompt(SupportsOffer, Protocol):
         """Pass received data to `sink` until the connection is closed.
 
         The sink returns whether it accepted the data; `receive` returns data that the sink refused.
+        """
+
+
+class GoalRecord(NamedTuple):
+    """The goals of a transport that drive the robot on, even if the transport's process ends."""
+
+    goals: tuple[tuple[str, str, bool], ...] = ()
+    """Id and action of each unfinished goal, oldest first, and whether it was cancelled."""
+    owed: tuple[str, ...] = ()
+    """Actions that owe an answer to the cancellation of all goals, oldest first."""
+
+
+@runtime_checkable
+class SupportsGoals(Protocol):
+    """A transport whose goals outlive its connections and its process."""
+
+    def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        """Take over the goals of an earlier process, and report each later change.
+
+        Args:
+            record: the goals of the earlier process.
+            changed: function that receives the whole record after each change. A new goal is
+                reported before it is sent.
         """
 
 

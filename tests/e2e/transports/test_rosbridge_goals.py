@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import os
+import signal
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
@@ -11,6 +13,7 @@ from websockets.asyncio.client import connect
 
 from tests.e2e.transports.leaks import nothing_left
 from urc.config.load import load_profile
+from urc.guard.pipe_channel import PipeChannel
 from urc.model.profile import Profile
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import CommandFailed, Session
@@ -141,6 +144,54 @@ async def test_stop_ends_a_goal_that_was_sent_to_another_port_of_the_robot(
                 await docking
             await until(session, lambda: session.hub.links["ros"].state == "live")
             await session.command("stop_docking", {})
+            await until(session, lambda: value(session, "going") is False)
+
+
+GUARDED = DOCKER.replace(
+    "  stop_docking:",
+    """  drive:
+    args: { speed: { type: number, min: -1, max: 1 } }
+    send:
+      publish:
+        topic: /cmd_vel
+        type: geometry_msgs/Twist
+        json: { linear: { x: "{{ speed }}" } }
+    hold: { repeat: 100ms, release: { speed: 0 } }
+  stop_docking:""",
+)
+
+
+@pytest.mark.parametrize("is_pressed_first", [False, True], ids=["killed first", "STOP first"])
+async def test_stop_ends_a_goal_that_was_started_through_a_guard_that_was_killed(
+    tmp_path: Path, is_pressed_first: bool
+) -> None:
+    """The new guard learns the goals and cancellations of the guard before it from the server."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(GUARDED)
+    rover = load_profile(path, built_in_catalog())
+    lost = asyncio.Event()
+    async with nothing_left(), emulated(rover) as port, cable(port, lost) as (near, _):
+        settings = {"host": "127.0.0.1", "port": near}
+        transports = built_in_catalog().transports
+        async with Session(rover, settings, transports, motion="guarded") as session:
+            await until(session, lambda: value(session, "going") is False)
+            docking = asyncio.create_task(session.command("dock", {}))
+            await until(session, lambda: value(session, "going") is True)
+            if is_pressed_first:
+                lost.set()
+                await session.command("stop_docking", {})
+                await asyncio.sleep(0.2)
+            assert session.backend is not None
+            assert isinstance(session.backend.channel, PipeChannel)
+            os.kill(session.backend.channel.pid, signal.SIGKILL)
+            with pytest.raises(CommandFailed):
+                await docking
+            lost.clear()
+            await until(session, lambda: session.hub.links["ros"].state == "live")
+            if not is_pressed_first:
+                await asyncio.sleep(0.5)
+                assert value(session, "going") is True
+                await session.command("stop_docking", {})
             await until(session, lambda: value(session, "going") is False)
 
 

@@ -1,13 +1,16 @@
 """The client of the guard: its one table of held commands, and what it tells a guard."""
 
 import pytest
+from msgspec.structs import replace
 
+from tests.unit.guard.lines import CountedWire
 from urc.guard import messages
-from urc.guard.channel import ChannelListener
+from urc.guard.channel import ChannelListener, GuardedLineSpec
 from urc.guard.guard_client import GuardClient, HeldSpec
 from urc.model.payload import Count, FrameVariants, Numbered, Payload
 from urc.motion.hold_to_run import LEASE_S, HoldTerms
 from urc.problems import UrcError
+from urc.transports.base import GoalRecord
 
 pytestmark = pytest.mark.anyio
 
@@ -65,6 +68,18 @@ def told(guard: GuardClient) -> list[object]:
     assert isinstance(guard.channel, FakeChannel)
     found, guard.channel.told = guard.channel.told, []
     return found
+
+
+def test_a_new_guard_learns_the_goals_that_the_last_one_reported() -> None:
+    make = messages.MakeTransport("ros", "a.b:c", {}, [], "", 0.25, True)
+    guard = GuardClient([GuardedLineSpec(make, CountedWire())], {}, FakeChannel)
+    assert list(guard.briefing()) == [make]
+    record = GoalRecord((("a1", "/dock", False),), ("/undock",))
+    for one in (GoalRecord(), record):
+        guard.handle(messages.GoalsChanged("ros", one), 0)
+    for _ in range(2):
+        guard.lost("the guard ended")
+        assert list(guard.briefing()) == [replace(make, goals=record)]
 
 
 async def test_control_is_armed_on_its_line(guard: GuardClient) -> None:

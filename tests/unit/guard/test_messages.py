@@ -6,6 +6,7 @@ from urc.guard import messages
 from urc.model.payload import Count, Envelope, Numbered
 from urc.model.values import NOTHING
 from urc.motion.hold_to_run import HoldTerms
+from urc.transports.base import GoalRecord
 
 PUBLISH = Envelope("publish", {"topic": "/cmd_vel"}, {"linear": {"x": 0.5}})
 IMAGE = Envelope("message", {"topic": "/camera"}, b"\xff\xd8")
@@ -13,10 +14,13 @@ FIRST = Count({}, {"n": 5})
 SIXTH = Count({"n": 5}, {"n": 6})
 STOPS = (Numbered(b"5 stop", FIRST), Numbered(PUBLISH, SIXTH))
 
+GOALS = GoalRecord((("a1", "/dock", True), ("b2", "/dock", False)), ("/dock", "/undock"))
+
 TO_GUARD: list[messages.ToGuard] = [
     messages.MakeTransport(
         "wire", "a.b:c", {"port": 1, "tls": {"ca": "x"}}, [("/t", {"qos": 1})], "", 0.25, True
     ),
+    messages.MakeTransport("ros", "a.b:c", {}, [], "", 0.25, True, None, GOALS),
     messages.OpenLine("wire", 3, 2.5),
     messages.SendBytes("wire", 3, 7, b"\x00\xff"),
     messages.SendBytes("wire", 3, 8, PUBLISH),
@@ -47,6 +51,7 @@ FROM_GUARD: list[messages.FromGuard] = [
     messages.Heartbeat(0.001),
     messages.CountersAdvanced("wire", 3, 8, {"n": 6}, [("drive", 9)]),
     messages.SendStale("wire", 3, 8, {"n": 6}),
+    messages.GoalsChanged("ros", GOALS),
 ]
 
 

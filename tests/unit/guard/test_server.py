@@ -7,11 +7,12 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from io import BytesIO
 from typing import Any, ClassVar
 
 import pytest
+from msgspec.structs import replace
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire
 from urc.guard import __main__ as program
@@ -20,7 +21,7 @@ from urc.guard.pipe import Pipe
 from urc.guard.real_time_priority import RealTimePriority
 from urc.guard.server import GuardServer
 from urc.testing.clock import FakeClock, settle
-from urc.transports.base import TopicSubscription, TransportSetup
+from urc.transports.base import GoalRecord, TopicSubscription, TransportSetup
 
 pytestmark = pytest.mark.anyio
 
@@ -79,6 +80,35 @@ async def test_what_nobody_armed_is_nobodys() -> None:
     host.settle()
     assert Robots.made[0][1].written == []
     assert said == []
+
+
+class GoalWire(CountedWire):
+    """A line whose goals drive the robot on after the end of the process."""
+
+    kept = GoalRecord()
+
+    def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        self.kept, self.changed = record, changed
+
+    @staticmethod
+    def make(setup: TransportSetup) -> "GoalWire":
+        robot = GoalWire()
+        Robots.made.append((setup, robot))
+        return robot
+
+
+def test_goals_are_handed_to_the_guard_and_their_changes_reported() -> None:
+    said: list[messages.FromGuard] = []
+    host = GuardServer(lambda one: said.append(one) or 0, FakeClock())  # type: ignore[func-returns-value]
+    before = GoalRecord((("a1", "/dock", True),), ("/dock",))
+    host.handle(replace(MAKE, factory=f"{__name__}:GoalWire.make", goals=before))
+    ((_, robot),) = Robots.made
+    assert isinstance(robot, GoalWire)
+    assert robot.kept == before
+    assert said == []
+    after = GoalRecord((("a1", "/dock", True), ("b2", "/dock", False)))
+    robot.changed(after)
+    assert said == [messages.GoalsChanged("wire", after)]
 
 
 async def test_nothing_is_taken_at_the_end() -> None:

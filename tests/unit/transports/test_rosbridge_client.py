@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from urc.model.payload import Envelope
-from urc.transports.base import NOTICE, PeerClosed
+from urc.transports.base import NOTICE, GoalRecord, PeerClosed
 from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.rosbridge_client import RosClient
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -98,6 +98,31 @@ def test_a_goal_of_the_other_kind_of_bridge_is_not_cancelled_by_its_id() -> None
     assert goals.owes("/dock"), "foxglove_bridge ends it later"
     sent(client, DOCK)
     assert not goals.owes("/dock"), "the new goal must not be ended"
+
+
+def test_the_record_reports_each_change_and_continues_in_another_process() -> None:
+    told: list[GoalRecord] = []
+    goals = UnfinishedGoals()
+    goals.keep(GoalRecord(), told.append)
+    goals.add("a", "/dock")
+    assert told == [GoalRecord((("a", "/dock", False),))]
+    goals.cancel("/dock")
+    goals.add("b", "/undock")
+    goals.cancel_late("c", "/undock")
+    goals.finish("nothing")
+    goals.settle("/undock")
+    last = GoalRecord(
+        (("a", "/dock", True), ("b", "/undock", False), ("c", "/undock", True)), ("/dock",)
+    )
+    assert told[-1] == last
+    assert len(told) == 5, "what changes nothing is not reported"
+    later = UnfinishedGoals()
+    later.keep(last, told.append)
+    assert later.record == last
+    later.settle("/dock")
+    for goal in "abc":
+        later.finish(goal)
+    assert told[-1] == GoalRecord()
 
 
 @pytest.mark.parametrize("status", [4, 5, 6])

@@ -7,11 +7,18 @@ With ``via: auto`` and no port, the transport tries the usual ports of both kind
 the port that worked last.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
 from urc.model.payload import Envelope, Payload
-from urc.transports.base import ConnectFailed, PeerClosed, Transport, TransportError, TransportSetup
+from urc.transports.base import (
+    ConnectFailed,
+    GoalRecord,
+    PeerClosed,
+    Transport,
+    TransportError,
+    TransportSetup,
+)
 from urc.transports.ros import rosbridge
 from urc.transports.ros.foxglove import DEFAULT_PORT as FOXGLOVE_PORT
 from urc.transports.ros.foxglove import FoxgloveTransport
@@ -81,9 +88,16 @@ class Candidate:
 class AnyBridgeTransport:
     """A reusable transport to the first bridge that answers."""
 
-    def __init__(self, candidates: list[Candidate], where: str) -> None:
-        """Store the candidates, without connecting; `where` is the target in readable form."""
+    def __init__(self, candidates: list[Candidate], where: str, goals: UnfinishedGoals) -> None:
+        """Store the candidates, without connecting.
+
+        Args:
+            candidates: the bridges to try.
+            where: target in readable form.
+            goals: record of unfinished goals, which the candidates share.
+        """
         self._candidates = candidates
+        self._goals = goals
         self._where = where
         self._bridge: _Bridge | None = None
 
@@ -96,6 +110,10 @@ class AnyBridgeTransport:
     def chosen(self) -> tuple[str, int]:
         """Kind and port of the bridge that answered last."""
         return self._candidates[0].kind, self._candidates[0].port
+
+    def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
+        self._goals.keep(record, changed)
 
     async def open(self, timeout_s: float) -> None:
         """Connect to a bridge within `timeout_s` seconds, or raise `ConnectFailed`."""
@@ -194,7 +212,7 @@ def from_setup(setup: TransportSetup) -> Transport:
         if via == "foxglove":
             return foxglove
         candidates.append(Candidate(number, wire, foxglove, other))
-    return AnyBridgeTransport(candidates, host if port is None else where)
+    return AnyBridgeTransport(candidates, host if port is None else where, goals)
 
 
 def _wire(setup: TransportSetup, where: str, *, offers: bool) -> WebSocketTransport:

@@ -14,11 +14,12 @@ announced again as soon as a connection opens.
 """
 
 import asyncio
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
 from urc.model.payload import Envelope, Payload
-from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
+from urc.transports.base import NOTICE, ConnectFailed, GoalRecord, PeerClosed, TransportError
 from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession
 from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
@@ -79,6 +80,10 @@ class FoxgloveTransport:
     def address(self) -> str:
         """The transport's target in readable form, such as ``ros 192.168.1.5:8765``."""
         return f"ros {self._where}"
+
+    def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
+        self._goals.keep(record, changed)
 
     async def open(self, timeout_s: float) -> None:
         """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""

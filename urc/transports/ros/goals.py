@@ -13,7 +13,10 @@ that were sent through its own kind of bridge by their ids.
 """
 
 import re
+from collections.abc import Callable
 from typing import Final
+
+from urc.transports.base import GoalRecord
 
 __all__ = ["FIRST_S", "MAX_GOALS", "UnfinishedGoals", "is_ros_id", "longer"]
 
@@ -49,15 +52,41 @@ class UnfinishedGoals:
         """Ids of the goals for which a cancellation was sent."""
         self._owed: dict[str, None] = {}
         """Actions whose cancellation of all goals has not been answered, oldest first."""
+        self._changed: Callable[[GoalRecord], None] | None = None
+
+    @property
+    def record(self) -> GoalRecord:
+        """The whole record."""
+        goals = tuple((one, name, one in self._cancelled) for one, name in self._actions.items())
+        return GoalRecord(goals, tuple(self._owed))
+
+    def keep(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        """Add the goals of an earlier process, and call `changed` after each later change."""
+        for goal, action, is_cancelled in record.goals:
+            self.add(goal, action)
+            if is_cancelled:
+                self._cancelled.add(goal)
+        self._owed.update(dict.fromkeys(record.owed[:MAX_GOALS]))
+        self._changed = changed
+
+    def _report(self) -> None:
+        if self._changed is not None:
+            self._changed(self.record)
 
     def add(self, goal: str, action: str) -> None:
         """Keep the goal with the id `goal`."""
         while len(self._actions) >= MAX_GOALS:
-            self.finish(next(iter(self._actions)))
+            self._forget(next(iter(self._actions)))
         self._actions[goal] = action
+        self._report()
 
     def finish(self, goal: str) -> None:
         """Forget a goal whose result has arrived; ignore unknown ids."""
+        if goal in self._actions:
+            self._forget(goal)
+            self._report()
+
+    def _forget(self, goal: str) -> None:
         self._actions.pop(goal, None)
         self._cancelled.discard(goal)
 
@@ -73,6 +102,7 @@ class UnfinishedGoals:
         while len(self._owed) >= MAX_GOALS:
             del self._owed[next(iter(self._owed))]
         self._owed[action] = None
+        self._report()
         return goals
 
     def cancel_late(self, goal: str, action: str) -> None:
@@ -80,6 +110,7 @@ class UnfinishedGoals:
         if goal not in self._actions:
             self.add(goal, action)
         self._cancelled.add(goal)
+        self._report()
 
     def cancelled(self) -> list[tuple[str, str]]:
         """Return the id and action of each goal with a cancellation but without a result."""
@@ -101,4 +132,6 @@ class UnfinishedGoals:
 
     def settle(self, action: str) -> None:
         """Forget the cancellation of all goals: it was answered, or a new goal is being sent."""
-        self._owed.pop(action, None)
+        if action in self._owed:
+            del self._owed[action]
+            self._report()

@@ -25,7 +25,7 @@ subscriptions wait for the list of topics, which determines the form of the type
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any, Final, Literal
@@ -37,6 +37,7 @@ from urc.transports.base import (
     NOTICE,
     TOPICS,
     ConnectFailed,
+    GoalRecord,
     PeerClosed,
     TransportError,
 )
@@ -101,6 +102,10 @@ class RosbridgeTransport:
     def address(self) -> str:
         """The transport's target in readable form, such as ``ros 192.168.1.5:9090``."""
         return f"ros {self._where}"
+
+    def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
+        """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
+        self._goals.keep(record, changed)
 
     async def open(self, timeout_s: float) -> None:
         """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
