@@ -21,7 +21,8 @@ from urc.guard.motion_scheduler import MotionScheduler
 from urc.guard.pipe import UNFIT
 from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, tolerant, why_broken
 from urc.guard.sent_counters import SentCounters
-from urc.model.payload import Payload
+from urc.model.payload import Envelope, Payload
+from urc.transports.arrival_check import ArrivalCheck
 from urc.transports.base import (
     PeerClosed,
     Prompt,
@@ -101,6 +102,7 @@ class GuardedConnection:
             is_moving=lambda: self.scheduler.is_moving,
             failed=self._stall,
         )
+        self._arrivals = ArrivalCheck(transport)
         self._offer = None
         if isinstance(transport, SupportsOffer):
             self._offer = tolerant(transport.offer, False, self._stall)
@@ -291,6 +293,7 @@ class GuardedConnection:
     def _begin(self) -> None:
         self._is_open = True
         self._handed.clear()
+        self._arrivals.begin()
         self._liveness.begin()
         self.scheduler.begin()
 
@@ -321,7 +324,7 @@ class GuardedConnection:
             while self._credit <= 0:
                 self._credited.clear()
                 await self._credited.wait()
-                self._liveness.note_arrival()  # the engine was slow, not the robot
+                self._liveness.note_delivery()  # the engine was slow, not the robot
             self._is_reading = True
             try:
                 data = await self.transport.receive()
@@ -338,9 +341,10 @@ class GuardedConnection:
         return True
 
     def _pass_on(self, data: Payload) -> None:
-        self._liveness.note_arrival()
+        self._liveness.note_delivery()
+        is_new = not isinstance(data, Envelope) or self._arrivals.is_new()
         try:
-            self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data))
+            self._credit -= self._emit(messages.BytesReceived(self.name, self._turn, data, is_new))
         except UNFIT as fault:
             raise PeerClosed(f"the received data cannot be passed on ({fault})") from fault
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from urc.guard.send_queue import LaneClock, TimerHandle, why_broken
 from urc.motion.liveness import ASKED_EVERY_S, SILENCE_S, Liveness
+from urc.transports.arrival_check import ArrivalCheck
 from urc.transports.base import SupportsProbe, Transport, TransportError
 
 __all__ = ["LivenessWatch"]
@@ -35,6 +36,7 @@ class LivenessWatch:
             failed: callback for a frozen program; it receives the reason.
         """
         self._transport = transport if isinstance(transport, SupportsProbe) else None
+        self._arrivals = ArrivalCheck(transport)
         self._clock = clock
         self._silent_s = silent_s
         self._is_moving = is_moving
@@ -53,7 +55,8 @@ class LivenessWatch:
         """Record that the connection is open."""
         self._is_open = True
         self._liveness = Liveness(self._silent_s)
-        self.note_arrival()
+        self._arrivals.begin()
+        self.note_delivery()
 
     def end(self) -> None:
         """Record that the connection is closed."""
@@ -65,9 +68,13 @@ class LivenessWatch:
             self._asking.cancel()
             self._asking = None
 
-    def note_arrival(self) -> None:
-        """Record that bytes were received, or that this machine paused reading."""
-        self._liveness.note_arrival(self._clock.now())
+    def note_delivery(self) -> None:
+        """Record that the transport has delivered data, or that this machine paused reading.
+
+        If the transport counts what arrives, only the count shows whether the program is alive.
+        """
+        if self._arrivals.is_new():
+            self._liveness.note_arrival(self._clock.now())
 
     def start(self) -> None:
         """Start the watch if a control is moving the robot."""
@@ -78,6 +85,8 @@ class LivenessWatch:
         self._alarm = None
         if not (self._is_open and self._is_moving()):
             return
+        if self._arrivals.is_counted:  # data may have arrived without a delivery
+            self.note_delivery()
         now = self._clock.now()
         if now >= self._liveness.deadline:
             ms = 1000 * (SILENCE_S if self._liveness.is_asked else self._silent_s or SILENCE_S)
@@ -95,7 +104,7 @@ class LivenessWatch:
     async def _send_probe(self, transport: SupportsProbe) -> None:
         try:
             await transport.probe()
-            self.note_arrival()
+            self._liveness.note_arrival(self._clock.now())
         except TransportError:
             pass  # the connection's reader reports it
         except Exception as bug:  # supervisor: a third-party transport may raise anything

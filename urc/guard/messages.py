@@ -181,11 +181,14 @@ class OpenFailed(msgspec.Struct, array_like=True, frozen=True, tag=22):
 
 
 class BytesReceived(msgspec.Struct, array_like=True, frozen=True, tag=23):
-    """Bytes or an envelope arrived on a connection."""
+    """Bytes or an envelope was received on a connection."""
 
     line: str
     turn: int
     data: Payload
+    is_new: bool = True
+    """Whether the remote program has sent data since the last message of this type. It has not if
+    the transport itself has made the envelope, or has held it back."""
 
 
 class SendDone(msgspec.Struct, array_like=True, frozen=True, tag=24):

@@ -85,6 +85,7 @@ class GuardedTransport:
         self._receiver: deque[tuple[Payload, int]] = deque()
         self._arrived = asyncio.Event()
         self._sink: Callable[[bytes], bool] | None = None
+        self._arrivals = 0
         self._taken_bytes = 0
         """Number of received bytes not yet acknowledged to the guard."""
         self._number = 0
@@ -156,6 +157,10 @@ class GuardedTransport:
         self._enqueue(data, taken)
         await taken
 
+    def arrivals(self) -> int:
+        """Return how often the guard has reported new data from the remote program."""
+        return self._arrivals
+
     async def close(self) -> None:
         """Close the connection immediately and never raise; a second call does nothing."""
         self._end(_CLOSED)
@@ -225,6 +230,7 @@ class GuardedTransport:
             case messages.BytesReceived(turn=turn, data=data) if (
                 turn == self._turn and self._is_open
             ):
+                self._arrivals += said.is_new
                 self._received(data, size)
             case messages.SendDone(turn=turn, number=number) if turn == self._turn:
                 self._sent(number)

@@ -199,9 +199,15 @@ class Engine:
         self._down(line, reason or "the robot closed the connection")
         return self._settle(events, now)
 
-    def receive(self, transport: str, data: Payload, now: float) -> list[Event]:
-        """Process bytes or an envelope received on `transport`."""
-        return self._settle(self.lines[transport].receive(data, now), now)
+    def receive(
+        self, transport: str, data: Payload, now: float, *, is_new: bool = True
+    ) -> list[Event]:
+        """Process bytes or an envelope received on `transport`.
+
+        `is_new` is false if the robot has sent nothing since the last call. The transport itself
+        has then made the envelope, or has held it back. Such an envelope ends no silence.
+        """
+        return self._settle(self.lines[transport].receive(data, now, is_new=is_new), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
         """Run a command; exactly one `Replied` or `Failed` reports the outcome."""

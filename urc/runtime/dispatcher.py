@@ -135,8 +135,10 @@ class EngineLike(Protocol):
     def start(self, transport: str, now: float) -> Sequence[Event]:
         """Handle an opened transport."""
 
-    def receive(self, transport: str, data: Payload, now: float) -> Sequence[Event]:
-        """Handle received bytes or a received message."""
+    def receive(
+        self, transport: str, data: Payload, now: float, *, is_new: bool = True
+    ) -> Sequence[Event]:
+        """Handle received bytes or a received message, which may have arrived earlier."""
 
     def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
         """Handle the loss of a transport, or a failed attempt to open it."""
@@ -244,17 +246,20 @@ class Dispatcher:
         """Report an opened transport to the engine."""
         self._run(lambda now: self._engine.start(transport, now))
 
-    def receive(self, transport: str, data: Payload, now: float) -> None:
-        """Pass received data to the engine; publish all resulting readings together."""
+    def receive(self, transport: str, data: Payload, now: float, *, is_new: bool = True) -> None:
+        """Pass received data to the engine; publish all resulting readings together.
+
+        Data that is not `is_new` does not show that the robot is alive.
+        """
         if self._is_stopped:
             return
         try:
-            events = self._engine.receive(transport, data, now)
+            events = self._engine.receive(transport, data, now, is_new=is_new)
         except Exception as bug:  # supervisor, as in `_run`
             self._survive(bug)
             return
         if events:
-            self._perform(events, transport)
+            self._perform(events, transport, is_new=is_new)
         self._arm_after(now)
 
     def closed(self, transport: str, reason: str) -> None:
@@ -347,7 +352,9 @@ class Dispatcher:
             self._perform(events, None)
         self._arm()
 
-    def _perform(self, events: Sequence[Event], heard_on: str | None) -> None:
+    def _perform(
+        self, events: Sequence[Event], heard_on: str | None, *, is_new: bool = True
+    ) -> None:
         ports = self._ports
         samples: list[Sample] = []
         answers: list[Answer] = []
@@ -357,13 +364,15 @@ class Dispatcher:
                 samples += event.samples
                 if event.transport not in ("", heard):
                     heard = event.transport
-                    ports[heard].frame_received()
+                    if is_new:
+                        ports[heard].frame_received()
             elif isinstance(event, Send):
                 ports[event.transport].send(event)
             elif isinstance(event, (Replied, Failed)):
                 answers.append(event)
-                if isinstance(event, Replied) and heard_on is not None and not samples:
-                    ports[heard_on].frame_received()
+                is_heard = isinstance(event, Replied) and heard_on is not None and not samples
+                if is_heard and is_new:
+                    ports[heard_on or ""].frame_received()
             elif isinstance(event, MotionEvent):
                 if self._motion is not None:
                     self._motion(event)

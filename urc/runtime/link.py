@@ -32,6 +32,7 @@ from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.hub import Hub, LinkState
 from urc.runtime.link_report import LinkReport
 from urc.runtime.output_buffer import STUCK_S, OutputBuffer
+from urc.transports.arrival_check import ArrivalCheck
 from urc.transports.base import (
     NOTICE,
     TOPICS,
@@ -98,6 +99,7 @@ class Link:
         self._spec = spec
         self._name = spec.name
         self._transport = transport
+        self._arrivals = ArrivalCheck(transport)
         self._dispatcher = dispatcher
         self._hub = hub
         self._clock = clock
@@ -137,7 +139,10 @@ class Link:
         self._close_reason: str | None = None
         """The engine's reason for closing the connection; data received after the close is
         dropped."""
+        self._arrivals.begin()
         self._heard_s = self._clock.now()
+        self._has_news = False
+        """Whether the robot has sent data that the engine does not know of."""
         self._is_reader_waiting = False
         self._is_ready = not self._spec.on_connect
         """Whether the connection's steps are done; true for a transport without steps."""
@@ -453,16 +458,20 @@ class Link:
             self._pass_on(data)
 
     def _pass_on(self, data: Payload) -> None:
+        now = self._clock.now()
+        if not isinstance(data, Envelope) or self._arrivals.is_new():
+            self._heard_s = now
+            self._has_news = True
         if isinstance(data, Envelope) and data.verb == NOTICE:
             self._report.log("warning", "notice", str(data.body))
             return
         if isinstance(data, Envelope) and data.verb == TOPICS:
             self._hub.set_topics(self._name, list_of(data))
             return
-        now = self._heard_s = self._clock.now()
         if self._hub.traffic_watchers:
             self._report.saw("received", data)
-        self._dispatcher.receive(self._name, data, now)
+        is_new, self._has_news = self._has_news, False
+        self._dispatcher.receive(self._name, data, now, is_new=is_new)
 
     async def _write(self) -> None:
         await self._outgoing.run(lambda: self._close_reason is not None)

@@ -25,6 +25,7 @@ __all__ = [
     "TransportSetup",
     "TopicSubscription",
     "SupportsAbort",
+    "SupportsArrivals",
     "SupportsEnd",
     "SupportsForget",
     "SupportsGoals",
@@ -184,6 +185,17 @@ class SupportsProbe(Protocol):
         Raises:
             TransportError: the connection broke.
         """
+
+
+@runtime_checkable
+class SupportsArrivals(Protocol):
+    """A transport that also delivers its own envelopes, or delivers messages after their arrival.
+
+    These deliveries do not prove that the robot is alive (`urc.transports.arrival_check`).
+    """
+
+    def arrivals(self) -> int:
+        """Return the number of messages that have arrived over this connection."""
 
 
 @runtime_checkable

@@ -49,6 +49,15 @@ class TopicReceiveQueue:
         self._ended: str | None = None
         self.dropped = 0
         """Number of envelopes dropped so far."""
+        self.arrivals = 0
+        """Number of messages that have arrived from the robot, whether queued or not."""
+
+    def note_arrival(self) -> None:
+        """Record a message from the robot, which may be queued later or not at all.
+
+        Envelopes that URC itself makes are queued without a call of this method.
+        """
+        self.arrivals += 1
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
         """Add a message of `topic`; drop the oldest messages if a limit is exceeded."""

@@ -91,6 +91,10 @@ class ZenohTransport:
         """Probe the router; return as soon as the router has replied."""
         await self._open_session().ping()
 
+    def arrivals(self) -> int:
+        """Return the number of values that have arrived over this connection."""
+        return 0 if self._session is None else self._session.queue.arrivals
+
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes."""
         return 0 if self._session is None else self._session.unsent()

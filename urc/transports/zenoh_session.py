@@ -298,7 +298,11 @@ class ZenohSession:
     def _hand_over(self, key: str, body: bytes, is_liveliness: bool) -> None:
         attributes = {"topic": key, "liveliness": True} if is_liveliness else {"topic": key}
         envelope = Envelope("message", attributes, body)
-        self.hand_over(partial(self.queue.message, key, envelope, len(key) + len(body)))
+        self.hand_over(partial(self._value, key, envelope, len(key) + len(body)))
+
+    def _value(self, key: str, envelope: Envelope, size_bytes: int) -> None:
+        self.queue.note_arrival()
+        self.queue.message(key, envelope, size_bytes)
 
     def _arrived(self) -> None:
         self._is_woken = False
@@ -374,8 +378,10 @@ class _Get:
             return
         session._gets.discard(self)  # noqa: SLF001
         attributes: dict[str, object] = {"id": self._number, "ok": not reason, "topic": key}
-        if reason:
+        if reason:  # perhaps the library's own, after a timeout
             attributes["reason"] = reason
+        else:
+            session.queue.note_arrival()
         session.queue.answer(Envelope("response", attributes, body), len(body or b""))
 
 

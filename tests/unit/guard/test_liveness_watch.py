@@ -5,7 +5,9 @@ import asyncio
 import pytest
 
 from tests.unit.guard.lines import STOP, TERMS, CountedWire, Rig
+from urc.guard.guarded_connection import WINDOW_BYTES
 from urc.guard.liveness_watch import LivenessWatch
+from urc.model.payload import Envelope
 from urc.motion.liveness import ASKED_EVERY_S, SILENCE_S
 from urc.testing.clock import FakeClock, settle
 from urc.transports.base import PeerClosed, Transport
@@ -37,6 +39,19 @@ class ProbedWire(CountedWire):
         if self.bug is not None:
             raise self.bug
         await self.lives.wait()
+
+
+class UnprobedCountingWire(CountedWire):
+    """One that counts what arrives, because it also delivers envelopes of its own."""
+
+    count = 0
+
+    def arrivals(self) -> int:
+        return self.count
+
+
+class CountingWire(UnprobedCountingWire, ProbedWire):
+    """The same, and its program can be asked for a sign of life."""
 
 
 async def held(rig: Rig, seconds: float) -> None:
@@ -109,6 +124,61 @@ async def test_whatever_arrives_is_a_sign_of_life(robot: ProbedWire, rig: Rig) -
         await held(rig, 0.05)
         await rig.transport.receive()
     assert robot.aborts == 0
+    robot.lives.set()
+
+
+@pytest.mark.parametrize("is_asked", [True, False])
+async def test_deliveries_that_did_not_just_arrive_are_no_sign_of_life(
+    rigs: list[Rig], is_asked: bool
+) -> None:
+    """Held-back messages, and answers that the transport makes, go on while the robot is frozen."""
+    robot = CountingWire() if is_asked else UnprobedCountingWire()
+    limit_s = SILENCE_S if is_asked else 2.0
+    rigs.append(rig := Rig(robot, stalled_s=1.0, is_strict=True, silent_s=2.0))
+    await rig.drive()
+    await held(rig, 0.2)
+    robot.count += 1
+    if isinstance(robot, CountingWire):
+        robot.lives.clear()
+    frozen_s = rig.clock.now()
+    while not robot.aborts:
+        robot.arriving.put_nowait(Envelope("message", {"topic": "/odom"}, b"late"))
+        await held(rig, 0.05)
+        await rig.transport.receive()
+        assert rig.clock.now() - frozen_s <= limit_s + ASKED_EVERY_S
+    if isinstance(robot, CountingWire):
+        robot.lives.set()
+
+
+async def test_arrivals_that_are_not_delivered_are_a_sign_of_life(rigs: list[Rig]) -> None:
+    """A throttle holds them back, or the engine is slow."""
+    robot = CountingWire()
+    rigs.append(rig := Rig(robot, stalled_s=1.0, is_strict=True))
+    await rig.drive()
+    await held(rig, 0.2)
+    robot.lives.clear()
+    for _ in range(40):
+        robot.count += 1
+        await held(rig, 0.05)
+    assert robot.aborts == 0
+    robot.lives.set()
+
+
+async def test_credit_of_the_engine_is_no_sign_of_life_of_a_counted_robot(
+    rigs: list[Rig],
+) -> None:
+    """The engine works off what has arrived before the freeze."""
+    robot = CountingWire()
+    rigs.append(rig := Rig(robot, stalled_s=1.0, is_strict=True))
+    await rig.drive()
+    robot.lives.clear()
+    frozen_s = rig.clock.now()
+    while not robot.aborts:
+        for _ in range(2):
+            robot.arriving.put_nowait(Envelope("message", {"topic": "/map"}, bytes(WINDOW_BYTES)))
+        await held(rig, 0.05)
+        await rig.transport.receive()
+        assert rig.clock.now() - frozen_s <= SILENCE_S + ASKED_EVERY_S
     robot.lives.set()
 
 

@@ -88,6 +88,18 @@ async def test_old_connections_say_nothing() -> None:
     assert await guard.line.receive() == b"new"
 
 
+async def test_only_new_data_counts_as_an_arrival() -> None:
+    """An envelope of the transport itself, or one that was held back, is not new."""
+    guard = Guard()
+    await guard.line.open(1.0)
+    guard.tell(messages.BytesReceived("wire", 1, b"a"), 3)
+    guard.tell(messages.BytesReceived("wire", 1, b"b", is_new=False), 3)
+    assert guard.line.arrivals() == 1
+    guard.tell(messages.BytesReceived("wire", 1, b"c"), 3)
+    guard.tell(messages.BytesReceived("wire", 9, b"of no connection"), 3)
+    assert guard.line.arrivals() == 2
+
+
 async def test_what_came_before_the_end_is_still_given() -> None:
     guard = Guard()
     await guard.line.open(1.0)

@@ -205,6 +205,28 @@ async def test_what_the_engine_may_be_behind_is_bounded_to_the_byte(bench: Bench
     assert bench.heard() == [messages.BytesReceived("wire", 1, b"later")]
 
 
+async def test_engine_is_told_whether_the_robot_has_sent_anything(benches: list[Bench]) -> None:
+    """Where the transport counts it; the first envelope of a connection is always new."""
+
+    class Counting(Wire):
+        count = 7
+
+        def arrivals(self) -> int:
+            return self.count
+
+    robot = Counting()
+    benches.append(bench := Bench(robot))
+    envelopes = [Envelope("message", {"topic": "a"}, at) for at in range(4)]
+    bench.host._lines["wire"]._emit = lambda said: bench.said.append(said) or 1  # type: ignore[func-returns-value]
+    await bench.open()
+    for at, envelope in enumerate(envelopes):
+        robot.count += at == 2
+        robot.arriving.put_nowait(envelope)
+        await settle()
+    new = [said.is_new for said in bench.heard() if isinstance(said, messages.BytesReceived)]
+    assert new == [True, False, True, False]
+
+
 async def test_end_of_a_line_is_told_in_the_robots_words(bench: Bench) -> None:
     bench.robot.cut("cable pulled")
     await settle()

@@ -40,7 +40,9 @@ class BrokenEngine:
     def closed(self, transport: str, reason: str, now: float) -> Sequence[Event]:
         raise ZeroDivisionError
 
-    def receive(self, transport: str, data: bytes, now: float) -> Sequence[Event]:
+    def receive(
+        self, transport: str, data: bytes, now: float, *, is_new: bool = True
+    ) -> Sequence[Event]:
         raise ZeroDivisionError
 
     def command(self, request: Request, now: float) -> Sequence[Event]:

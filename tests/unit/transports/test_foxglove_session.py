@@ -1,10 +1,13 @@
 """The Foxglove protocol of one connection, without a socket."""
 
+import asyncio
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from urc.model.payload import Envelope
+from urc.transports.base import NOTICE, TOPICS
 from urc.transports.ros.foxglove_session import MAX_RETRIES, FoxgloveSession, TopicWish
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -16,6 +19,9 @@ ODOM = {
     "schemaName": "nav_msgs/msg/Odometry",
     "schema": "",
 }
+
+
+MESSAGE = b"\x01" + (1).to_bytes(4, "little") + (7).to_bytes(8, "little") + b"{}"
 
 
 def greeted() -> FoxgloveSession:
@@ -77,6 +83,34 @@ def test_a_topic_with_messages_was_not_refused() -> None:
     """The same number may be the number of a channel of this client."""
     session = greeted()
     subscribed(session)
-    session.arrived(b"\x01" + (1).to_bytes(4, "little") + (7).to_bytes(8, "little") + b"{}")
+    session.arrived(MESSAGE)
     refuse(session)
     assert subscribed(session) == []
+
+
+def test_only_frames_of_the_bridge_are_arrivals() -> None:
+    """Neither messages that the throttle delivers later, nor the answers of URC itself."""
+    queue, late = TopicReceiveQueue(), list[Callable[[], None]]()
+    session = FoxgloveSession(
+        queue,
+        (TopicWish("/odom", "", 0.5),),
+        TopicGraph(lambda _: None, 2),
+        call_at=lambda _, work: late.append(work),
+        clock=lambda: 1.0,
+        published={},
+    )
+    hear(session, {"op": "advertise", "channels": [ODOM]})
+    session.reconcile()
+    session.arrived(MESSAGE)
+    session.arrived(MESSAGE)
+    assert queue.arrivals == 3
+    bodies = [asyncio.run(queue.pop()).verb for _ in range(2)]
+    assert bodies == ["definition", "message"]
+    late.pop()()
+    session.perform(Envelope("call", {"id": 1, "service": "/rosapi/topics"}))
+    session.perform(Envelope("call", {"id": 2, "service": "/none"}))
+    session.perform(Envelope(TOPICS, {"topics": []}))
+    session.tell("a notice")
+    delivered = [asyncio.run(queue.pop()).verb for _ in range(5)]
+    assert delivered == ["message", "response", "response", TOPICS, NOTICE]
+    assert queue.arrivals == 3

@@ -245,11 +245,11 @@ class Conversation(Connection):
         self._may_recut = True
         return self.process_frames(now) if self.receiver.has_more else []
 
-    def receive(self, data: Payload, now: float) -> list[LineEvent]:
-        """Process bytes or an envelope from the transport."""
+    def receive(self, data: Payload, now: float, *, is_new: bool = True) -> list[LineEvent]:
+        """Process bytes or an envelope from the transport; `is_new` as in `Engine.receive`."""
         if self.state != "open":
             return []
-        if self.spec.stale_after_s is not None:
+        if is_new and self.spec.stale_after_s is not None:
             self._read_frames(now)
         if isinstance(data, Envelope):
             told = self._unpacked(data, now)

@@ -55,6 +55,7 @@ class _Bridge(Protocol):
     async def abort(self) -> None: ...
     async def settle(self) -> str: ...
     async def probe(self) -> None: ...
+    def arrivals(self) -> int: ...
     def unsent(self) -> int: ...
 
 
@@ -158,6 +159,10 @@ class AnyBridgeTransport:
     async def probe(self) -> None:
         """Probe the bridge; return when the bridge sends data."""
         await self._open_bridge().probe()
+
+    def arrivals(self) -> int:
+        """Return the number of frames that have arrived over this connection."""
+        return 0 if self._bridge is None else self._bridge.arrivals()
 
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes."""

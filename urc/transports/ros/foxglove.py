@@ -184,6 +184,10 @@ class FoxgloveTransport:
         """Probe the bridge; return when the bridge sends data."""
         await self._wire.probe()
 
+    def arrivals(self) -> int:
+        """Return the number of frames that have arrived over this connection."""
+        return 0 if self._session is None else self._session.queue.arrivals
+
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes."""
         return self._wire.unsent()

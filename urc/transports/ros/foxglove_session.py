@@ -160,6 +160,7 @@ class FoxgloveSession:
 
     def arrived(self, frame: bytes) -> None:
         """Process one frame; invalid frames are counted and logged."""
+        self.queue.note_arrival()
         try:
             said = self._reader.read(frame)
             if isinstance(said, MessageData):

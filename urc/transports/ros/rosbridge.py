@@ -173,6 +173,10 @@ class RosbridgeTransport:
         """Probe the bridge; return when the bridge sends data."""
         await self._wire.probe()
 
+    def arrivals(self) -> int:
+        """Return the number of frames that have arrived over this connection."""
+        return 0 if self._session is None else self._session.queue.arrivals
+
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes."""
         return self._wire.unsent()
@@ -412,6 +416,7 @@ class _Session:
         try:
             while True:
                 frame = await self._wire.receive()
+                self.queue.note_arrival()
                 operation = None
                 if self._packed and len(frame) > LARGE_BYTES and frame.startswith(b"{"):
                     operation = await packed_operation(frame, self._packed)

@@ -177,6 +177,10 @@ class RosZenohTransport:
         """Probe the router; return as soon as the router has replied."""
         await self._open_node().session.ping()
 
+    def arrivals(self) -> int:
+        """Return the number of messages that have arrived over this connection."""
+        return 0 if self._node is None else self._node.session.queue.arrivals
+
     def unsent(self) -> int:
         """Return the number of unacknowledged bytes."""
         return 0 if self._node is None else self._node.session.unsent()
@@ -288,6 +292,7 @@ class _RosNode:
     def _message(
         self, one: _Subscription, kind: tuple[str, str], data: bytes, told: bytes | None
     ) -> None:
+        self.session.queue.note_arrival()
         sent_ns = source_time(told)
         if sent_ns is not None:
             self._time.told(sent_ns, time.time_ns())
