@@ -11,8 +11,8 @@ const STILL_PX = 8;
 const WAY = 0.75;
 
 /**
- * Make an element a slide. It acts after a drag to its end and a release, after a long press, or on
- * the arrow keys.
+ * Make an element a slide. It acts after a drag to its end and a release, after a long press, or
+ * after ten separate presses of an arrow key.
  *
  * @param {HTMLElement} el empty
  * @param {object} spec
@@ -91,8 +91,7 @@ export function slide(el, { label, done, touched, isReady = () => true, onStop, 
     const way = { ArrowRight: 0.1, ArrowUp: 0.1, ArrowLeft: -0.1, ArrowDown: -0.1 }[event.key];
     if (way === undefined || !isReady()) return;
     event.preventDefault();
-    // A held key slides once; it must be released before the next slide.
-    if (event.repeat && share === 0) return;
+    if (event.repeat) return; // a key that something presses down would confirm by itself
     touched?.();
     hold.drop(); // one input at a time
     put(Math.round((share + way) * 10) / 10);
