@@ -235,6 +235,8 @@ async def test_diagnostics_of_several_programs_are_one_tree(new_page: PageMaker)
     """A report in the same frame as another one is not lost; branches open by mouse and by keys."""
     use = WidgetUse("table", "table", {"report": "report"}, options={"view": "tree"})
     async with shown(new_page, use) as (robot, page):
+        # A page that comes later receives only the newest report.
+        await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
         wrist = {"level": 2, "name": "/arm/wrist", "message": "hot"}
         robot.set_reading("report", {"status": [wrist, {"level": 0, "name": "/arm/elbow"}]})
         values = [{"key": "rate", "value": "10 Hz"}]

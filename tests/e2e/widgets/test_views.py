@@ -68,7 +68,7 @@ async def test_distances_around_the_robot(new_page: PageMaker) -> None:
         await until_pixel(page, ".scan-data", 0.5, 0.4, "r > 120 && r > b + 40 && a === 255")
         await until_pixel(page, ".scan-data", 0.75, 0.5, "a === 255 && Math.abs(r - b) < 40")
         await until_pixel(page, ".scan-data", 0.25, 0.5, "a === 0")
-        await until_text(page, ".scan-scale", "◯ 2 m")
+        await until_text(page, ".scan-scale", "◯ 5 m")
         assert await page.evaluate(BESIDE), "the figure covers obstacles"
         button = page.get_by_role("button", name="View: Dots")
         await button.click()
