@@ -115,6 +115,25 @@ def test_json_keeps_the_types_of_its_leaves() -> None:
     assert one.read(Frame(b"\xff", "utf-8")) is None
 
 
+SAME_NUMBERS = (
+    ("61.0", "61"),
+    ("-0.0", "0"),
+    ("(60.6 | round)", "61"),
+    ("(122 / 2)", "61"),
+    ("(61.0 | clamp(-100, 100))", "61"),
+    ("60.5", "60.5"),
+    ("1e300", "1e+300"),
+    ("true", "true"),
+)
+
+
+@pytest.mark.parametrize(("expression", "number"), SAME_NUMBERS)
+def test_json_writes_equal_numbers_alike(expression: str, number: str) -> None:
+    """As in text, a whole number has no decimal point, at any depth of the document."""
+    one = writer(f"json: {{ l: '{{{{ {expression} }}}}', deep: [{{ r: '{{{{ x }}}}' }}] }}")
+    assert one.write({"x": 100.0}) == f'{{"l":{number},"deep":[{{"r":100}}]}}'.encode()
+
+
 @pytest.mark.parametrize(
     ("encoding", "data"), [("utf-8", '["é"]'.encode()), ("ascii", b'["\\u00e9"]')]
 )

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from urc.expressions import Template, quoted
 from urc.model.payload import Envelope, Payload, WriteSpec
@@ -10,6 +10,9 @@ from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritabl
 from urc.protocol.values.text_values import counter_in
 
 __all__ = ["JsonWriter", "filled", "matches"]
+
+_EXACT: Final = float(2**53)
+"""All whole numbers up to this one are exact as floats."""
 
 
 class JsonWriter:
@@ -27,7 +30,7 @@ class JsonWriter:
     def write(self, namespace: Mapping[str, object]) -> Payload:
         """Return the JSON text; raise `NotWritable` or `ExpressionError`."""
         try:
-            return self._text(filled(self._tree, namespace)).encode(self._encoding)
+            return self._text(_plain(filled(self._tree, namespace))).encode(self._encoding)
         except UnicodeEncodeError as error:
             wrong = error.object[error.start]
             raise NotWritable(f"{quoted(wrong)} cannot be encoded in {self._encoding}") from None
@@ -42,7 +45,7 @@ class JsonWriter:
 
     def value(self, namespace: Mapping[str, object]) -> object:
         """Return the JSON data before encoding; raise `NotWritable` or `ExpressionError`."""
-        value = filled(self._tree, namespace)
+        value = _plain(filled(self._tree, namespace))
         self._text(value)
         return value
 
@@ -70,6 +73,19 @@ def filled(tree: Any, namespace: Mapping[str, object]) -> Any:
     if isinstance(tree, list):
         return [filled(inner, namespace) for inner in tree]
     return tree
+
+
+def _plain(value: Any) -> Any:
+    """Return JSON data with whole floats as integers, so equal numbers have the same text.
+
+    Some programs on robots refuse ``61.0`` as an integer, and none refuses ``61`` as a float.
+    """
+    if isinstance(value, float):
+        is_whole = value.is_integer() and abs(value) <= _EXACT
+        return int(value) if is_whole else value
+    if isinstance(value, dict):
+        return {name: _plain(inner) for name, inner in value.items()}
+    return [_plain(inner) for inner in value] if isinstance(value, list) else value
 
 
 def _completed(tree: Any, value: Any) -> Any:
