@@ -1,6 +1,7 @@
 """The card of a lost robot in a real browser: cause, next step, Try now; and widgets keep quiet."""
 
 import re
+from contextlib import AbstractAsyncContextManager
 
 import pytest
 from playwright.async_api import Page, expect
@@ -15,6 +16,7 @@ from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.values import Signal
 from urc.runtime.hub import LinkState
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.transports.base import MissingPackage
 
 pytestmark = pytest.mark.anyio
 
@@ -198,3 +200,25 @@ async def test_the_card_is_readable_and_whole_in_each_theme(
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= screen["width"]
         assert abs(box["x"] * 2 + box["width"] - screen["width"]) <= 2
+
+
+PACKAGE = "mqtt needs the package paho-mqtt: " + "x" * 90 + " -m pip install 'paho-mqtt<3,>=2.1'"
+
+
+class UninstalledRobot(FakeRobot):
+    """A robot whose transport needs an extra that is not installed."""
+
+    def open(self) -> AbstractAsyncContextManager[FakeRobot]:
+        raise MissingPackage(PACKAGE)
+
+
+async def test_a_robot_whose_extra_is_missing_is_not_a_lost_server(new_page: PageMaker) -> None:
+    """The card has the whole command, however long it is."""
+    async with running_dashboard(UninstalledRobot(dashboard_profile())) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await expect(page.locator(CARD)).to_contain_text("Cannot open Puppet")
+        await expect(page.locator(CARD)).to_contain_text(PACKAGE)
+        await expect(page.locator(CARD)).to_contain_text("Install it, then start URC again.")
+        await expect(page.locator("[data-badge-text]")).to_have_text("Cannot open")
+        await expect(page.locator("body")).not_to_contain_text("to URC", use_inner_text=True)

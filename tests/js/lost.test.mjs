@@ -1,15 +1,17 @@
 // @ts-check
-/** The card of a lost robot: when it is shown, and its words. */
+/** The card and the badge of a lost robot: when they are shown, and their words. */
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { install } from "./dom.mjs";
+import { Badge } from "../../urc/web/static/live/badge.js";
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
 import { lastWords, lossOf, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
 function socket(more = {}) {
-  return { failures: 0, isShutOut: false, reason: "", ...more };
+  return { failures: 0, isShutOut: false, refusal: "", ...more };
 }
 
 /** @param {Record<string, string>} states state of each transport */
@@ -60,17 +62,41 @@ test("without the server the card speaks of the server, after the first failure"
   const store = new Store();
   assert.equal(lossOf(store, socket()), null);
   assert.deepEqual(lossOf(store, socket({ failures: 1 })), { of: "server", detail: "" });
-  assert.deepEqual(lossOf(store, socket({ failures: 1, reason: "no answer" })), { of: "server", detail: "" });
   assert.equal(lossOf(store, socket({ failures: 1, isShutOut: true })), null);
 });
 
 test("a reason of the server is no lost connection to it", () => {
   const reason = "too many clients watch this robot";
-  const loss = lossOf(new Store(), socket({ failures: 1, reason }));
+  const loss = lossOf(new Store(), socket({ failures: 1, refusal: reason }));
   assert.deepEqual(loss, { of: "session", detail: reason });
   assert.ok(loss);
   assert.equal(wordsOf(loss, "Cart").heading, "Cannot open Cart");
   assert.equal(wordsOf(loss, "Cart").cause, reason);
+  assert.equal(wordsOf(loss, "Cart").step, "Check the settings of the robot.");
+});
+
+test("a package that is not installed is no mistake in the settings", () => {
+  const detail = "mqtt needs the package paho-mqtt: python3 -m pip install 'paho-mqtt<3,>=2.1'";
+  const { cause, step } = wordsOf({ of: "session", detail }, "Rover");
+  assert.equal(cause, detail);
+  assert.equal(step, "Install it, then start URC again.");
+  assert.equal(causeWords("", "ros 127.0.0.1:9", detail).step, "Install it, then start URC again.");
+});
+
+/** @returns {[string, string | undefined]} text and sign of the badge */
+function badgeOf(/** @type {Store} */ store, /** @type {any} */ line) {
+  install();
+  const el = document.createElement("div");
+  for (const name of ["data-badge-text", "data-badge-trip"]) el.append(document.createElement("span"));
+  [...el.children].forEach((one, place) => one.setAttribute(place ? "data-badge-trip" : "data-badge-text", ""));
+  new Badge(el).frame(store, { tripMs: null, ...line });
+  return [el.children[0]?.textContent ?? "", el.dataset["state"]];
+}
+
+test("the badge tells a robot that cannot be opened from a server that is gone", () => {
+  assert.deepEqual(badgeOf(new Store(), socket()), ["Connecting", "connecting"]);
+  assert.deepEqual(badgeOf(new Store(), socket({ failures: 1 })), ["No connection to URC", "bad"]);
+  assert.deepEqual(badgeOf(new Store(), socket({ failures: 1, refusal: "x" })), ["Cannot open", "bad"]);
 });
 
 test("a refusal names the program that the transport needs", () => {

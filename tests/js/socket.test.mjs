@@ -82,6 +82,23 @@ test("a line whose ping is not answered for three seconds is given up", () => {
   passes(2);
   assert.ok(!socket.isUp);
   assert.equal(socket.reason, "no answer");
+  assert.equal(socket.refusal, "", "a silent server refuses nothing");
+});
+
+test("the refusal is the full text of the server, for one attempt", () => {
+  const { socket, line } = opened();
+  line.says({ t: "error", code: "refused", message: "mqtt needs the package paho-mqtt: …" });
+  line.dispatchEvent(Object.assign(new Event("close"), { code: 4500, reason: "mqtt needs" }));
+  assert.equal(socket.refusal, "mqtt needs the package paho-mqtt: …");
+  socket.connect();
+  lines.at(-1)?.dispatchEvent(Object.assign(new Event("close"), { code: 1006, reason: "" }));
+  assert.equal(socket.refusal, "");
+});
+
+test("a browser that must sign in is not refused the robot", () => {
+  const { socket, line } = opened();
+  line.dispatchEvent(Object.assign(new Event("close"), { code: 4401, reason: "sign in" }));
+  assert.equal(socket.refusal, "");
 });
 
 test("an opening that hangs is given up, too", () => {

@@ -3,7 +3,7 @@
 import asyncio
 import gc
 import time
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -25,6 +25,7 @@ from urc.problems import UrcError
 from urc.runtime.audit import FILE, AuditLog
 from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
+from urc.runtime.missing_packages import missing_package
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.server_recorder import NO_ACTOR, ServerRecorder
 from urc.runtime.session import Motion, Session
@@ -161,6 +162,7 @@ async def _serve(
             profile.name: await _robot_at_start(stack, factory, place, profile, faulty)
             for profile in profiles
         }
+        _warn_of_packages(robots.values())
         if faulty is not None:
             faulty.begin(faults)
             await stack.enter_async_context(_listening(faulty))
@@ -188,6 +190,13 @@ async def _serve(
             further=[foxglove] if foxglove is not None else [],
         )
     return 0
+
+
+def _warn_of_packages(robots: Iterable[Robot]) -> None:
+    """Report robots that no page can open, because an extra is not installed."""
+    for robot in robots:
+        if text := missing_package(robot.profile, robot.settings, built_in_catalog().transports):
+            complain(f"urc: {robot.profile.name} cannot be opened: {text}")
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:

@@ -20,6 +20,7 @@ __all__ = [
     "ByteStream",
     "Tunnel",
     "ConnectFailed",
+    "MissingPackage",
     "PeerClosed",
     "Prompt",
     "TransportSetup",
@@ -60,7 +61,12 @@ class TransportError(UrcError):
 
     - `ConnectFailed`: the attempt was refused or timed out, or the host is unknown.
     - `PeerClosed`: the robot closed the connection, or the connection broke.
+    - `MissingPackage`: an extra is not installed.
     """
+
+
+class MissingPackage(TransportError):
+    """Raised if a transport needs a package of an extra that is not installed."""
 
 
 class ConnectFailed(TransportError):

@@ -6,7 +6,7 @@ This module does not import the MQTT library itself, so that it can report a mis
 from importlib.util import find_spec
 
 from urc._extras import missing
-from urc.transports.base import Transport, TransportError, TransportSetup
+from urc.transports.base import MissingPackage, Transport, TransportSetup
 from urc.transports.mqtt_options import read_options
 from urc.transports.web_dial import Dialer
 from urc.transports.web_origin import WebOrigin
@@ -18,11 +18,12 @@ def from_setup(setup: TransportSetup) -> Transport:
     """Return an MQTT transport for a document's options; see docs/transports/mqtt.md.
 
     Raises:
-        TransportError: an option is missing or invalid, or the library is missing.
+        TransportError: an option is missing or invalid.
+        MissingPackage: the library is not installed.
     """
     options = read_options(setup)
     if find_spec("paho") is None:
-        raise TransportError(missing("mqtt needs", "paho-mqtt", "mqtt"))
+        raise MissingPackage(missing("mqtt needs", "paho-mqtt", "mqtt"))
     from urc.transports.mqtt_client import MqttTransport  # imports paho
 
     place = WebOrigin(options.tls is not None, options.host, options.port, "")

@@ -16,7 +16,13 @@ from urc.transports import _options
 from urc.transports._faults import late, reason
 from urc.transports._stream import StreamTransport, tune
 from urc.transports._stream_dialer import StreamDialer
-from urc.transports.base import ConnectFailed, Transport, TransportError, TransportSetup
+from urc.transports.base import (
+    ConnectFailed,
+    MissingPackage,
+    Transport,
+    TransportError,
+    TransportSetup,
+)
 
 if TYPE_CHECKING:
     from urc.transports._serial_port import SerialStream
@@ -90,7 +96,8 @@ def from_setup(setup: TransportSetup) -> Transport:
     """Return a serial transport for a document's options.
 
     Raises:
-        TransportError: an option is missing or invalid, or the extra is not installed.
+        TransportError: an option is missing or invalid.
+        MissingPackage: the extra is not installed.
     """
     options = setup.options
     port = _options.text("serial", options, "port").strip()
@@ -209,4 +216,4 @@ def _need_serialx() -> None:
     try:
         import serialx  # noqa: F401
     except ImportError as error:
-        raise TransportError(missing("serial needs", "serialx", "serial")) from error
+        raise MissingPackage(missing("serial needs", "serialx", "serial")) from error

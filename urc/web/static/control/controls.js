@@ -141,7 +141,7 @@ export class Controls {
    */
   words(isMine, isAsked, iAsk, leftS) {
     const lease = this.drive.lease;
-    if (!lease) return t("Not connected to URC");
+    if (!lease) return this.drive.socket.refusal ? t("Not connected to the robot") : t("Not connected to URC");
     const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
     if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
     if (isMine) return t("● You drive");

@@ -21,6 +21,9 @@ const PROGRAMS = {
   telnet: mark("Is the Telnet server running?"),
 };
 
+/** Message about an extra that is not installed; see `urc._extras.missing`. */
+const MISSING_PACKAGE = /\bneeds? the package /;
+
 /** @type {Record<string, {cause: string, step: string}>} */
 const CAUSES = {
   refused: { cause: mark("{place} refuses the connection."), step: mark("Is the robot's program running?") },
@@ -68,9 +71,20 @@ const CAUSES = {
  */
 export function causeWords(cause, address, detail) {
   const known = CAUSES[cause];
-  if (!known) return { cause: detail, step: t("Check the settings of the robot."), isForeign: detail !== "" };
+  if (!known) return { cause: detail, step: stepOf(detail), isForeign: detail !== "" };
   const program = cause === "refused" ? PROGRAMS[typeOf(address)] : undefined;
   return { cause: t(known.cause, { place: placeOf(address) }), step: t(program ?? known.step), isForeign: false };
+}
+
+/**
+ * Return a hint for a failure without a known cause.
+ *
+ * @param {string} detail message of the server or the transport
+ */
+export function stepOf(detail) {
+  // The message names the command that installs the package.
+  if (MISSING_PACKAGE.test(detail)) return t("Install it, then start URC again.");
+  return t("Check the settings of the robot.");
 }
 
 /** @param {string} address */

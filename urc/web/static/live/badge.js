@@ -32,7 +32,7 @@ export class Badge {
    * @param {Socket} socket
    */
   frame(store, socket) {
-    let [sign, text] = summary(store, socket.failures > 0);
+    let [sign, text] = summary(store, socket);
     // A playback is never live.
     if (this.isReplay && sign === "good") [sign, text] = ["replay", t("Replay")];
     if (this.el.dataset["state"] !== sign) this.el.dataset["state"] = sign;
@@ -46,11 +46,14 @@ export class Badge {
 
 /**
  * @param {Store} store
- * @param {boolean} hasFailed whether an attempt has failed since the last connection
+ * @param {Socket} socket
  * @returns {[Sign, string]}
  */
-function summary(store, hasFailed) {
-  if (!store.isUp) return hasFailed ? ["bad", t("No connection to URC")] : ["connecting", t("Connecting")];
+function summary(store, socket) {
+  if (!store.isUp) {
+    if (socket.failures === 0) return ["connecting", t("Connecting")];
+    return ["bad", socket.refusal ? t("Cannot open") : t("No connection to URC")];
+  }
   const links = [...store.links.values()];
   const worst = WORST_FIRST.find((state) => links.some((link) => link.state === state));
   const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : t("Robot");

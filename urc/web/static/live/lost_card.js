@@ -8,15 +8,13 @@
  * @typedef {import("./store.js").Store} Store
  */
 import { part } from "./badge.js";
-import { attemptsText, causeWords, lostForText } from "../core/connection_causes.js";
+import { attemptsText, causeWords, lostForText, stepOf } from "../core/connection_causes.js";
 import { said, t } from "../core/words.js";
 
 /** Time from the loss of a good connection until the card covers the page. */
 const GRACE_MS = 3000;
 /** Time from which the page says that it waits for the first connection. */
 const SHORT_MS = 700;
-/** Reason for a socket that closed itself. */
-const SILENT = "no answer";
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
 
@@ -139,7 +137,7 @@ export function wordsOf(loss, title) {
     case "robot":
       return { heading: t("Cannot reach {title}", { title }), ...causeWords(loss.cause, loss.address, loss.detail) };
     case "session":
-      return { heading: t("Cannot open {title}", { title }), cause: said(loss.detail), step: t("Check the settings of the robot."), isForeign: false };
+      return { heading: t("Cannot open {title}", { title }), cause: said(loss.detail), step: stepOf(loss.detail), isForeign: false };
     case "server":
       return { heading: t("No connection to URC"), cause: "", step: t("Is the server running? Is this device on its network?"), isForeign: false };
   }
@@ -185,8 +183,7 @@ export function triesWords(loss, store, lostMs, nowMs) {
 export function lossOf(store, socket, onDemand = []) {
   if (!store.isUp) {
     if (socket.failures === 0 || socket.isShutOut) return null;
-    const { reason } = socket;
-    return reason && reason !== SILENT ? { of: "session", detail: reason } : { of: "server", detail: "" };
+    return socket.refusal ? { of: "session", detail: socket.refusal } : { of: "server", detail: "" };
   }
   const links = [...store.links.values()].filter(({ transport }) => !onDemand.includes(transport));
   const lost = links.find(({ state }) => state === "lost");

@@ -22,6 +22,8 @@ const PING_EVERY_MS = 1000;
  * page. A blocked page has only one tick, and then reads the messages that have arrived meanwhile.
  */
 const SILENT_TICKS = 3;
+/** Reason for a socket that closes itself, because pings get no replies. */
+const SILENT = "no answer";
 /** Close code of a restarted server, which does not know browsers from earlier starts. */
 const NOT_LET_IN = 4401;
 
@@ -48,6 +50,8 @@ export class Socket {
     this.failures = 0;
     /** The server's reason for closing the socket. */
     this.reason = "";
+    /** Full text of the reason, which arrives before the close frame and its short text. */
+    this.refused = "";
     this.isUp = false;
     /** Whether the user must first open the printed address. */
     this.isShutOut = false;
@@ -92,6 +96,11 @@ export class Socket {
     return true;
   }
 
+  /** Reason for which the reachable server refuses the robot; "" without a refusal. */
+  get refusal() {
+    return this.isUp || this.isShutOut || this.reason === SILENT ? "" : this.reason;
+  }
+
   /** Bytes in the browser's send buffer. */
   get unsent() {
     return this.line?.bufferedAmount ?? 0;
@@ -133,6 +142,9 @@ export class Socket {
       this.listener.state(true);
       // The first ping waits for `tick`, because the page is slow at its start.
       this.listener.message(message);
+    } else if (message.t === "error" && message.code === "refused") {
+      this.refused = message.message;
+      this.listener.message(message);
     } else if (message.t === "pong") {
       this.tripMs = performance.now() - message.c;
       this.pingedMs = 0;
@@ -150,7 +162,7 @@ export class Socket {
       return;
     }
     this.silent += 1;
-    if (this.silent >= SILENT_TICKS) this.lose("no answer");
+    if (this.silent >= SILENT_TICKS) this.lose(SILENT);
   }
 
   ping() {
@@ -167,7 +179,8 @@ export class Socket {
     clearTimeout(this.retry);
     if (line && line.readyState <= WebSocket.OPEN) line.close();
     this.tripMs = null;
-    this.reason = reason;
+    this.reason = this.refused || reason;
+    this.refused = "";
     this.isUp = false;
     this.failures += 1;
     this.listener.state(false);
