@@ -69,6 +69,17 @@ _HEIGHTS = {"value": "var(--urc-height-value)", "button": "var(--urc-target-driv
 """Heights of footprints with a fixed height."""
 _SOFT = "minmax(3.625rem,max-content)"
 """Height of a shrinking row: at least the height of a value."""
+_SOFT_ROW = "minmax(3.625rem,1fr)"
+"""Row of a plain grid without a stick, next to rows with sticks, which get their height first."""
+_LEVER_ROW = "minmax(7.25rem,1fr)"
+_STICK = "var(--urc-stick) + var(--urc-stick-head)"
+"""Height of a stick's cell."""
+_BESIDE_STOP = "var(--urc-dock) + var(--urc-space-3)"
+"""Added to `_STICK` after a minus: the part of a corner stick's cell that is next to STOP."""
+_MOST_SOFT = 6
+"""Maximum number of rows that shrink for a stick; a window cannot show more of them."""
+_MOST_LOW = 3
+"""Maximum number of rows next to a stick on a phone in landscape."""
 _SIDES = ("start", "center", "end")
 _ESCAPED = frozenset('"\\<>&\n\r\f\0')
 
@@ -239,11 +250,14 @@ def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
         return {}
     over = bool(canvas.background)
     wide = grids.get("landscape") or next(iter(grids.values()))
-    base = _filled(wide, canvas.slots)
+    base = _roomy(_filled(wide, canvas.slots), canvas)
     placed = {"base": base}
     if "portrait" in grids:
-        placed[TALL] = _filled(grids["portrait"], canvas.slots)
-    low = _filled(grids["phone_landscape"], canvas.slots) if "phone_landscape" in grids else base
+        placed[TALL] = _roomy(_filled(grids["portrait"], canvas.slots), canvas)
+    if "phone_landscape" in grids:
+        low = _roomy(_filled(grids["phone_landscape"], canvas.slots), canvas)
+    else:
+        low = base if over else _stick_rows(base, canvas)
     placed[SHORT] = low if over else _cropped(low)
     upright = grids.get("phone_portrait") or grids.get("portrait") or wide
     phone = _cropped(_filled(upright, canvas.slots))
@@ -251,6 +265,53 @@ def _placed(grids: Mapping[str, Layout], canvas: _Canvas) -> dict[str, Layout]:
         phone = _stacked(phone)
     placed[PHONE] = phone
     return placed
+
+
+def _roomy(grid: Layout, canvas: _Canvas) -> Layout:
+    """Return a plain grid whose one-row sticks also take the empty cells above them."""
+    if canvas.background:
+        return grid
+    taken = {cell for slot in grid.slots for cell in _cells(slot)}
+    filled = {row for row, _ in taken}
+    slots = []
+    for slot in grid.slots:
+        above = slot._replace(row=slot.row - 1, row_span=1)
+        is_stick = canvas.footprints.get(slot.name) == "stick" and slot.row_span == 1
+        if is_stick and above.row in filled and taken.isdisjoint(_cells(above)):
+            slot = above._replace(row_span=2)
+        slots.append(slot)
+    return grid._replace(slots=tuple(slots))
+
+
+def _cells(slot: Slot) -> set[tuple[int, int]]:
+    """Return the row and column of each cell of a slot."""
+    return {
+        (slot.row + down, slot.column + across)
+        for down in range(slot.row_span)
+        for across in range(slot.column_span)
+    }
+
+
+def _stick_rows(grid: Layout, canvas: _Canvas) -> Layout:
+    """Return the rows that a phone in landscape can show next to a stick; all without a stick."""
+    rows = sorted(_rows_of("stick", grid, canvas))
+    if not rows or len(rows) > _MOST_LOW:
+        return grid
+    slots = []
+    for slot in grid.slots:
+        shown = [row for row in rows if slot.row <= row < slot.row + slot.row_span]
+        if shown:
+            slots.append(slot._replace(row=rows.index(shown[0]), row_span=len(shown)))
+    return Layout(len(rows), grid.columns, tuple(slots))
+
+
+def _rows_of(footprint: Footprint, grid: Layout, canvas: _Canvas) -> set[int]:
+    """Return the rows with a widget of this footprint."""
+    return _used(
+        (slot.row, slot.row_span)
+        for slot in grid.slots
+        if canvas.footprints.get(slot.name) == footprint
+    )
 
 
 def _screens(place: str, grids: Mapping[str, Layout], canvas: _Canvas, hand: str = "") -> str:
@@ -301,6 +362,9 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
     elif screen == PHONE:
         is_low = [_kinds(place, grid, canvas) <= _HEIGHTS.keys() for place in range(grid.rows)]
         sizes = [_LOW_ROW if low else size for low, size in zip(is_low, sizes, strict=True)]
+        sizes = _stick_heights(grid, canvas, sizes)
+    else:
+        sizes = _around_sticks(grid, canvas, sizes)
     if canvas.background and screen == PHONE:
         sizes = [_GROUND_ROW, *sizes]
     rows = " ".join(sizes) or "none"
@@ -344,6 +408,40 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
             size = "max(" + ",".join(_HEIGHTS[kind] for kind in sorted(kinds)) + ")"
         rows.append(size)
     return rows
+
+
+def _around_sticks(grid: Layout, canvas: _Canvas, sizes: Sequence[str]) -> list[str]:
+    """Return the row sizes of a plain grid: sticks get their height, and the other rows the rest."""
+    sticks = _rows_of("stick", grid, canvas)
+    others = _used((slot.row, slot.row_span) for slot in grid.slots) - sticks
+    if not sticks or len(others) > _MOST_SOFT:
+        return _stick_heights(grid, canvas, sizes, is_wide=True)
+    levers = _rows_of("lever", grid, canvas)
+    soft = [
+        size if size == _MARGIN else _LEVER_ROW if row in levers else _SOFT_ROW
+        for row, size in enumerate(sizes)
+    ]
+    return _stick_heights(grid, canvas, soft, is_wide=True)
+
+
+def _stick_heights(
+    grid: Layout, canvas: _Canvas, sizes: Sequence[str], *, is_wide: bool = False
+) -> list[str]:
+    """Return the row sizes with the height of each stick; `is_wide`: corners are next to STOP."""
+    heights: dict[int, set[str]] = {}
+    for slot in grid.slots:
+        if canvas.footprints.get(slot.name) != "stick" or (slot.row_span > 1 and not is_wide):
+            continue
+        whole = _STICK
+        if is_wide and _is_corner(slot, grid, canvas):
+            whole += f" - {_BESIDE_STOP}"
+        each = f"({whole} - {slot.row_span - 1}*{_GAP})/{slot.row_span}"
+        for row in range(slot.row, slot.row + slot.row_span):
+            heights.setdefault(row, {"3.625rem"}).add(each)
+    return [
+        f"minmax(max({','.join(sorted(heights[row]))}),1fr)" if row in heights else size
+        for row, size in enumerate(sizes)
+    ]
 
 
 def _kinds(row: int, grid: Layout, canvas: _Canvas) -> set[str]:

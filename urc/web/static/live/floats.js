@@ -62,6 +62,8 @@ function placeFloats(stage) {
   /** @type {Box[]} */
   const taken = cells.filter((el) => isShown(el) && !isInDrawer(el)).map((el) => el.getBoundingClientRect());
   const room = stage.getBoundingClientRect();
+  // The strip of an alarm can appear at the head of the stage, where it must cover no button.
+  taken.push({ ...edges(room), bottom: room.top + (parseFloat(getComputedStyle(stage).paddingTop) || 0) - GAP });
   for (const el of floats) {
     if (!isOnGround(el) || !isShown(el) || !el.textContent?.trim()) continue;
     const box = el.getBoundingClientRect();
@@ -98,6 +100,14 @@ export function freeShift(box, taken, room) {
   const distance = (/** @type {[number, number]} */ [x, y]) => Math.abs(x) + Math.abs(y);
   shifts.sort((one, other) => distance(one) - distance(other));
   return shifts.find(isFree) ?? [0, 0];
+}
+
+/**
+ * @param {DOMRect} rect
+ * @returns {Box}
+ */
+function edges({ left, top, right, bottom }) {
+  return { left, top, right, bottom };
 }
 
 /**

@@ -36,7 +36,7 @@ export function offerHints(root) {
     card.remove();
   });
   card.append(list, button);
-  bands.append(card);
+  bands.before(card); // not over the stage, where controls are
 }
 
 function wasSeen() {
