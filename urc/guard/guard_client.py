@@ -106,7 +106,7 @@ class GuardClient:
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
         """Table of all commands that are armed or may be moving the robot."""
-        self._goals: dict[str, GoalRecord] = {}
+        self.goals: dict[str, GoalRecord] = {}
         """Unfinished goals of each transport, as last reported by the guard."""
         self._stops: deque[tuple[str, StopReport]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
@@ -253,7 +253,7 @@ class GuardClient:
     def briefing(self) -> Iterator[messages.ToGuard]:
         """Yield the messages that initialise a new guard: pending stops, then armed controls."""
         for spec in self.lines:
-            goals = self._goals.get(spec.make.line)
+            goals = self.goals.get(spec.make.line)
             yield spec.make if goals is None else replace(spec.make, goals=goals)
         for command, control in self._controls.items():
             control.number, control.first = 0, 1
@@ -270,7 +270,7 @@ class GuardClient:
         elif isinstance(message, messages.StopDue):
             self._record_due(message.control)
         elif isinstance(message, messages.GoalsChanged):
-            self._goals[message.line] = message.record
+            self.goals[message.line] = message.record
         elif not isinstance(message, messages.Heartbeat):
             self.transports[message.line].handle(message, size)
             if isinstance(message, messages.LineLost | messages.LineClosed):

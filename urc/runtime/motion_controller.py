@@ -21,7 +21,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from secrets import randbelow
 
-from urc.model.driver import Driver
+from urc.model.driver import Command, Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.role import includes
 from urc.model.values import Reading
@@ -88,6 +88,11 @@ class MotionController:
         self._moves = any(one.moves for one in driver.commands.values())
         self._screens: dict[str, _Screen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
+        self._cancels = tuple(
+            name for name in self._stops if _is_cancellation(driver.commands[name])
+        )
+        self._unanswered = set(self._cancels) if self.lease.latched else set[str]()
+        """Delivered stop commands whose goals the robot may still follow."""
         self._due: set[str] = set()
         """Held commands whose stop must still be passed to a backend, or passed again because it
         was too early."""
@@ -123,6 +128,22 @@ class MotionController:
             if self.is_confirmed:
                 self.on_change(self.lease.state)
 
+    def await_answer(self, command: str) -> None:
+        """Record that a stop command cancels goals, and that the robot has not answered yet."""
+        self._unanswered.add(command)
+
+    def answered(self, command: str) -> None:
+        """Record that the robot has answered the cancellation of goals by a stop command."""
+        if command in self._unanswered:
+            self._unanswered.discard(command)
+            if self.is_certain:
+                self.on_change(self.lease.state)
+
+    def owe_unanswered(self) -> None:
+        """Send the unanswered stop commands of a latched STOP again, in a new session."""
+        if self.lease.latched:
+            self._unconfirmed |= self._unanswered
+
     def holds(self, command: str) -> bool:
         """Return whether `command` is a held command."""
         return command in self._holds
@@ -135,6 +156,16 @@ class MotionController:
     def is_confirmed(self) -> bool:
         """Whether the last stop is confirmed: all its frames written and its commands delivered."""
         return not self._unconfirmed
+
+    @property
+    def is_unanswered(self) -> bool:
+        """Whether the robot may still follow goals that the last stop cancels."""
+        return bool(self._unanswered)
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether the last stop is confirmed, and the robot has answered all cancelled goals."""
+        return not self._unconfirmed and not self._unanswered and self.has_own_stop
 
     @property
     def is_stop_due(self) -> bool:
@@ -258,6 +289,7 @@ class MotionController:
     def stop(self, by: str) -> None:
         """Stop the robot and latch the stop, regardless of the lease."""
         self._unconfirmed = {*self._holds, *self._stops}
+        self._unanswered.clear()
         if self._backend is not None:
             self._backend.stop(self._stop_frames(self._holds))
         self._settle(self.lease.stop(by), is_stopped=True)
@@ -520,6 +552,11 @@ class MotionController:
 
 def _unrefused(command: str, why: str) -> None:
     """Ignore a refusal."""
+
+
+def _is_cancellation(command: Command) -> bool:
+    """Return whether a command cancels the goals of a ROS action."""
+    return command.send.options.get("verb") == "cancel"
 
 
 def _ignore(state: LeaseState) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from urc.model.driver import Command, Driver
-from urc.model.payload import Payload
+from urc.model.payload import Envelope, Payload
 from urc.model.role import Role, includes
 from urc.model.values import NOTHING, Reading
 from urc.motion.lease import WATCHES, Operator
@@ -38,6 +38,8 @@ __all__ = [
 
 AGAIN_S = 1.0
 """Delay before an undelivered STOP is sent again, in seconds."""
+LOOK_S = 0.1
+"""Interval between checks for the answers to cancellations, in seconds."""
 _STOP = Operator("", "STOP")
 OUT_OF_SCOPE = "this token does not permit the command"
 HELD = "this command moves the robot only while a control is held; it cannot be sent once"
@@ -58,6 +60,9 @@ class Drivable(MotionSession, Protocol):
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
+
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """Return whether the robot owes an answer to the cancellation of an action's goals."""
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
@@ -158,6 +163,7 @@ class OneShotCommands:
         """Deliver every STOP to a session; deliver a latched or unacknowledged STOP immediately."""
         self._session = session
         self._pressed.clear()
+        self._controller().owe_unanswered()
         if self._controller().lease.latched or self._controller().owed:
             self.stopped()
         try:
@@ -186,14 +192,30 @@ class OneShotCommands:
 
     async def _give_stops(self, session: Drivable) -> None:
         """Repeat the stop commands until the robot has acknowledged each command."""
+        actions: dict[str, str] = {}
         while owed := self._controller().owed:
             async with asyncio.TaskGroup() as group:
                 for command in owed:
-                    group.create_task(self._give_stop(session, command))
+                    group.create_task(self._give_stop(session, command, actions))
             if self._controller().owed:
                 await self._clock.sleep(AGAIN_S)
+        await self._await_answers(session, actions)
 
-    async def _give_stop(self, session: Drivable, command: str) -> None:
+    async def _await_answers(self, session: Drivable, actions: dict[str, str]) -> None:
+        """Wait until the robot has answered the cancellations; the transport repeats them.
+
+        Args:
+            session: the session that has sent the cancellations.
+            actions: action of each stop command that cancels goals, keyed by command.
+        """
+        while actions and self._controller().lease.latched:
+            for command, action in tuple(actions.items()):
+                if not session.owes_answer(self.driver.commands[command].transport, action):
+                    del actions[command]
+                    self._controller().answered(command)
+            await self._clock.sleep(LOOK_S)
+
+    async def _give_stop(self, session: Drivable, command: str, actions: dict[str, str]) -> None:
         sent: list[Payload] = []
         outcome, is_heard = "done", True
         try:
@@ -206,6 +228,10 @@ class OneShotCommands:
             )
         if sent:
             self._recorder.ran(_STOP, command, {}, outcome, sent[-1])
+        last = sent[-1] if sent else None
+        if outcome == "done" and isinstance(last, Envelope) and last.verb == "cancel":
+            actions[command] = str(last.attributes.get("action"))
+            self._controller().await_answer(command)
         if is_heard:
             self._controller().given(command)
 

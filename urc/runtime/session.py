@@ -34,6 +34,7 @@ from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
 from urc.runtime.settings import resolve_settings
 from urc.runtime.transport_chain import make_transports
+from urc.transports.base import GoalRecord, SupportsGoals, Transport
 
 if TYPE_CHECKING:
     from urc.guard.guard_client import GuardClient
@@ -128,6 +129,8 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
         """Renderer of held commands' frames."""
+        self._goals: dict[str, GoalRecord] = {}
+        """Unfinished goals of each transport, if there is no backend."""
         self.backend = self._make_backend(engine, transports, motion)
         """Writer of held-command frames; None if the session cannot hold commands."""
         self._dispatcher = Dispatcher(
@@ -175,11 +178,14 @@ class Session:
 
     def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
         driver = self.profile.driver
-        transports = (
-            make_transports(driver, self.settings, table)
-            if self.backend is None
-            else self.backend.transports
-        )
+        transports: Mapping[str, Transport]
+        if self.backend is not None:
+            transports = self.backend.transports
+        else:
+            transports = make_transports(driver, self.settings, table)
+            for name, one in transports.items():
+                if isinstance(one, SupportsGoals):
+                    one.keep_goals(GoalRecord(), partial(self._goals.__setitem__, name))
         links = {
             name: Link(
                 spec,
@@ -330,6 +336,12 @@ class Session:
         other verbs then only cancel an earlier ``step``.
         """
         self._dispatcher.pull(sequence, what)
+
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """Return whether the robot owes an answer to the cancellation of an action's goals."""
+        goals = self._goals if self.backend is None else self.backend.goals
+        record = goals.get(transport)
+        return record is not None and action in record.owed
 
     def latch(self, reason: str) -> None:
         """End all running sequences and refuse autonomous motion after a press of STOP.

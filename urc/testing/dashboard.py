@@ -134,6 +134,10 @@ class FakeRobot:
         self.pulls: list[tuple[str, Pull]] = []
         """Requests about sequences."""
         self.reconnects = 0
+        self.owes_answers = False
+        """Whether the robot owes answers to cancellations of goals."""
+        self.payloads: dict[str, Payload] = {}
+        """Sent frame of each command, instead of the command's name."""
         """Number of calls of `reconnect` so far."""
         self.latched: list[str] = []
         """Reasons for all latched stops, in order."""
@@ -168,9 +172,9 @@ class FakeRobot:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
     ) -> Replied:
-        """Record the command, report its name as the sent frame, and return the test's reply."""
+        """Record the command, report its sent frame, and return the test's reply."""
         if on_sent is not None:
-            on_sent(name.encode())
+            on_sent(self.payloads.get(name, name.encode()))
         self.confirmed_by.append(confirmed_by)
         self.commands.append((name, dict(arguments)))
         values = self.on_command(name, arguments) if self.on_command else {}
@@ -183,6 +187,10 @@ class FakeRobot:
     def pull(self, sequence: str, what: Pull) -> None:
         """Record the request to pause, step, resume or end a sequence."""
         self.pulls.append((sequence, what))
+
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """Return whether the test has set `owes_answers`."""
+        return self.owes_answers
 
     def latch(self, reason: str) -> None:
         """Record the reason for a latched stop."""

@@ -228,7 +228,8 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     stops: int
     """Number of presses of STOP since the server started."""
     confirmed: bool
-    """Whether all transports of the robot have accepted the stop."""
+    """Whether all transports of the robot have accepted the stop, and the robot has answered all
+    cancellations of goals."""
     drives: bool
     """Whether the page may drive."""
     forces: bool

@@ -235,9 +235,11 @@ async def test_a_refused_cancellation_is_repeated_until_the_robot_ends_the_route
         await until(lambda: len(action.cancels) >= 4)
         assert {code for _, code in action.cancels} == {REJECTED}
         assert action.running
+        assert robot.session.owes_answer("ros", "/follow_waypoints")
         action.refuses = False
         with pytest.raises(CommandFailed, match="the action was cancelled"):
             await following
+        await until(lambda: not robot.session.owes_answer("ros", "/follow_waypoints"))
 
 
 async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -> None:

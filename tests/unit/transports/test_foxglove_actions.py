@@ -251,6 +251,10 @@ def test_a_reply_that_comes_before_the_acceptance_ends_no_cancellation(number: i
     ((name, one),) = bridge.cancelled()
     assert name == goal
     bridge.reply(one, code(0))
+    bridge.advance(1)
+    ((name, one),) = bridge.cancelled()
+    assert name == ALL, "its reply did not count while the goal was on its way"
+    bridge.reply(one, code(0))
     bridge.advance(60)
     assert bridge.cancelled() == []
 
@@ -371,6 +375,29 @@ def test_the_refused_cancellation_of_all_goals_is_told_and_repeated() -> None:
     bridge.reply(call, code(2))
     bridge.advance(60)
     assert bridge.cancelled() == []
+
+
+def test_the_cancellation_of_all_goals_is_answered_only_when_no_goal_can_follow() -> None:
+    """A goal that is on its way, or that rclpy refuses to cancel, may drive the robot on."""
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    call, goal = bridge.start()
+    bridge.session.perform(CANCEL)
+    (_, every), (_, one) = bridge.cancelled()
+    bridge.reply(every, code(2))
+    bridge.reply(one, code(2))
+    assert goals.owes("/dock")
+    bridge.reply(call, YES)
+    bridge.encode()
+    bridge.advance(1)
+    calls = dict(bridge.cancelled())
+    bridge.reply(calls[ALL], answer(0, []))
+    bridge.reply(calls[goal], answer(0, []))
+    assert goals.owes("/dock")
+    bridge.advance(2)
+    calls = dict(bridge.cancelled())
+    bridge.reply(calls[ALL], code(0))
+    assert not goals.owes("/dock")
 
 
 def test_an_unanswered_cancellation_of_all_goals_is_repeated_on_the_next_connection() -> None:

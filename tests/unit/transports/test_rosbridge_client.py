@@ -100,6 +100,28 @@ def test_a_goal_of_the_other_kind_of_bridge_is_not_cancelled_by_its_id() -> None
     assert not goals.owes("/dock"), "the new goal must not be ended"
 
 
+def test_the_results_of_all_cancelled_goals_answer_the_cancellation() -> None:
+    goals = UnfinishedGoals()
+    client = RosClient(TopicReceiveQueue(), 2, goals)
+    first, second = sent(client, DOCK) + sent(client, DOCK)
+    sent(client, DOCK._replace(attributes={**DOCK.attributes, "action": "/undock"}))
+    for action in ("/dock", "/undock"):
+        sent(client, CANCEL._replace(attributes={"action": action}))
+    client.arrived(ended(first, 5), 100)
+    assert goals.owes("/dock")
+    client.arrived(ended(second, 5), 100)
+    assert goals.owed() == ["/undock"]
+
+
+def test_without_a_known_goal_no_cancellation_is_answered() -> None:
+    goals = UnfinishedGoals()
+    client = RosClient(TopicReceiveQueue(), 2, goals)
+    (goal,) = sent(client, DOCK)
+    client.arrived(ended(goal, 4), 100)
+    sent(client, CANCEL)
+    assert goals.owes("/dock"), "another program may have sent a goal"
+
+
 def test_the_record_reports_each_change_and_continues_in_another_process() -> None:
     told: list[GoalRecord] = []
     goals = UnfinishedGoals()

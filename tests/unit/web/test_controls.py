@@ -42,6 +42,10 @@ class Scene:
         self.beats: dict[str, int] = {}
         self._numbers = 0
 
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """No goal is ever sent here."""
+        return False
+
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""
 

@@ -7,11 +7,14 @@ import pytest
 from tests.unit.web.test_client import FakeLine, scene
 from urc.expressions import compile_expression
 from urc.model.driver import Argument, Command
-from urc.model.payload import WriteSpec
+from urc.model.payload import Envelope, WriteSpec
 from urc.model.sequence import WaitStep
 from urc.protocol.events import Replied
+from urc.runtime.motion_controller import MotionController
+from urc.runtime.one_shot_commands import OneShotCommands
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
+from urc.testing.dashboard import dashboard_profile
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.page_socket import BrowserClient
 from urc.web.wire.drive import Drive
@@ -168,6 +171,67 @@ async def test_a_robot_with_a_stop_of_its_own_is_given_it_once_for_each_press() 
         assert it.robot.commands == [("halt", {})] * 2
         ran = [(one.who, one.command, one.outcome) for one in it.audit if one.what == "ran"]
         assert ran == [("STOP", "halt", "done")] * 2
+
+
+GOALS = Envelope("cancel", {"action": "/dock"})
+ABANDON = {"abandon": Command("abandon", "wire", WriteSpec("json", {"verb": "cancel"}), stops=True)}
+
+
+async def test_a_stop_that_cancels_goals_is_confirmed_when_the_robot_has_answered() -> None:
+    """The transport repeats the cancellation; the other stop commands do not wait for it."""
+    async with scene(commands=FOLD | HALT | ABANDON) as it:
+        it.robot.payloads["abandon"] = GOALS
+        it.robot.owes_answers = True
+        it.line.say({"t": "stop"})
+        await it.clock.advance(30)
+        assert [name for name, _ in it.robot.commands] == ["halt", "abandon"]
+        assert not confirmed(it.line)
+        assert it.service.is_at_rest, "nothing is left to be sent"
+        it.robot.owes_answers = False
+        await it.clock.advance(0.2)
+        assert confirmed(it.line)
+        assert [name for name, _ in it.robot.commands] == ["halt", "abandon"]
+
+
+@pytest.mark.parametrize("is_reset", [False, True])
+async def test_an_unanswered_cancellation_is_sent_again_in_the_next_session_of_a_latched_stop(
+    is_reset: bool,
+) -> None:
+    async with scene(commands=FOLD | HALT | ABANDON) as it:
+        it.robot.payloads["abandon"] = GOALS
+        it.robot.owes_answers = True
+        it.line.say({"t": "stop"})
+        await it.clock.advance(1)
+        if is_reset:
+            it.line.say({"t": "drive", "verb": "reset"})
+        it.robot.commands.clear()
+        controls = it.service.controls
+        driver, recorder = it.robot.profile.driver, controls.recorder
+        again = OneShotCommands(driver, lambda: controls.controller, it.clock, recorder)
+        serving = asyncio.create_task(again.serve(it.robot))
+        await it.clock.advance(1)
+        sent = [name for name, _ in it.robot.commands]
+        assert sent == ([] if is_reset else ["abandon"])
+        assert not controls.controller.is_certain or is_reset
+        it.robot.owes_answers = False
+        await it.clock.advance(1)
+        serving.cancel()
+        await settle()
+        assert confirmed(it.line) or is_reset
+
+
+def test_after_a_restart_a_latched_stop_that_cancels_goals_is_not_confirmed() -> None:
+    driver = dashboard_profile(commands=FOLD | ABANDON).driver
+    first = MotionController(driver)
+    first.stop("Ann")
+    first.given("abandon")
+    assert first.is_certain
+    later = MotionController(driver, kept=first.lease.state)
+    assert (later.is_certain, later.owed) == (False, [])
+    later.owe_unanswered()
+    assert later.owed == ["abandon"], "the first session sends it again"
+    plain = MotionController(dashboard_profile(commands=HALT).driver, kept=first.lease.state)
+    assert plain.is_certain
 
 
 async def test_a_stop_that_did_not_reach_the_robot_is_given_until_it_does() -> None:

@@ -293,5 +293,9 @@ class PlaybackSession:
     def pull(self, sequence: str, what: Pull) -> None:
         """Do nothing, because a recording does not run sequences."""
 
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """Return False, because a recording cancels nothing."""
+        return False
+
     def latch(self, reason: str) -> None:
         """Do nothing, because a recording does not move a robot."""

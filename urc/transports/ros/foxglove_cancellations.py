@@ -206,7 +206,8 @@ class GoalCancellations:
         elif code == _REJECTED:
             self._tell_refusal(attempt)
         elif attempt.goal == _ALL:
-            self.superseded(attempt.action)
+            if not self._is_followed(attempt.action, reply):
+                self.superseded(attempt.action)
         elif reply is not None and code == _ACCEPTED and not _cancels(reply):
             self._tell_refusal(attempt)  # rclpy reports a refusal like this
         elif attempt.goal in self._awaited:
@@ -218,6 +219,15 @@ class GoalCancellations:
             self._drop((attempt.action, attempt.goal))
         elif code != _UNKNOWN:
             self.ended(attempt.goal)  # no result follows on this connection
+
+    def _is_followed(self, action: str, reply: ServiceReply | None) -> bool:
+        """Return whether the robot may follow a goal despite its reply to the zero id."""
+        if action in self._awaited.values():
+            return True  # the robot may still accept it
+        # rclpy reports a refusal as success without goals.
+        is_empty = reply is None or not _cancels(reply)
+        running = [goal for goal, name in self._goals.cancelled() if name == action]
+        return is_empty and any(goal in self._started for goal in running)
 
     def _tell_refusal(self, attempt: _Attempt) -> None:
         self._calls.tell(f"the robot refused to cancel {_what(attempt)}; URC asks again")

@@ -116,6 +116,10 @@ class UnfinishedGoals:
         """Return the id and action of each goal with a cancellation but without a result."""
         return [one for one in self._actions.items() if one[0] in self._cancelled]
 
+    def action(self, goal: str) -> str:
+        """Return the action of a kept goal; "" for an unknown id."""
+        return self._actions.get(goal, "")
+
     def is_cancelled(self, goal: str) -> bool:
         """Return whether a goal has a cancellation but no result."""
         return goal in self._cancelled

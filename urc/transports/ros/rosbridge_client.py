@@ -241,6 +241,14 @@ class RosClient:
             )
             self._queue.answer(Envelope(NOTICE, {}, text))
 
+    def _finish(self, goal: str) -> None:
+        """Forget an ended goal; the last cancelled goal of an action answers its cancellation."""
+        action = self._goals.action(goal)
+        is_cancelled = self._goals.is_cancelled(goal)
+        self._goals.finish(goal)
+        if is_cancelled and action not in dict(self._goals.cancelled()).values():
+            self._goals.settle(action)
+
     def _cancel_goal(self, goal: str, action: str, wait_s: float = FIRST_S) -> None:
         self._repeats[goal] = self._clock() + wait_s, longer(wait_s)
         ActionClient(self._ros, action, "", reconnect_on_close=False).cancel_goal(goal)
@@ -273,7 +281,7 @@ class RosClient:
         self._queue.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
 
     def _result(self, goal: str, number: object, is_ok: bool, result: Any) -> None:
-        self._goals.finish(goal)
+        self._finish(goal)
         status, values = result["status"], result["values"]
         attributes = {"id": number, "ok": is_ok, "status": status}
         if not is_ok:

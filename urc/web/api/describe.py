@@ -92,7 +92,7 @@ def robot_info(
         connections=tuple(
             _connection(transport, links.get(transport)) for transport in profile.driver.transports
         ),
-        confirmed=controller.is_confirmed,
+        confirmed=controller.is_confirmed and not controller.is_unanswered,
         stops=controller.lease.state.stops,
         signals=tuple(_signal(one) for one in profile.driver.signals.values()),
         commands=tuple(

@@ -240,8 +240,8 @@ class ControlService:
         if is_told and operator.seen != self._number:
             operator.seen = self._number
             controller, now = self.controller, self._clock.now()
-            is_confirmed = controller.is_confirmed and controller.has_own_stop
-            texts.append(operator.lease(controller.lease.state, now, is_confirmed=is_confirmed))
+            is_certain = controller.is_certain
+            texts.append(operator.lease(controller.lease.state, now, is_confirmed=is_certain))
         texts += operator.notices.values()
         operator.notices.clear()
         if operator.heartbeat is not None:

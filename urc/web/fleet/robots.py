@@ -129,6 +129,9 @@ class SessionLike(MotionSession, Protocol):
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, resume or end a running sequence."""
 
+    def owes_answer(self, transport: str, action: str) -> bool:
+        """Return whether the robot owes an answer to the cancellation of an action's goals."""
+
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
 
@@ -325,13 +328,15 @@ class RobotService:
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
 
     async def deliver_stop(self) -> bool:
-        """Wait for at most `STOP_WITHIN_S` seconds; return whether the robot received the stop."""
+        """Wait for at most `STOP_WITHIN_S` seconds; return whether the stop is certain."""
         controller = self.controls.controller
         end_s = self.clock.now() + STOP_WITHIN_S
         with self.visit():
-            while not controller.is_confirmed and self.clock.now() < end_s:
+            while not controller.is_certain and self.clock.now() < end_s:
+                if controller.is_confirmed and not controller.has_own_stop:
+                    break
                 await self.clock.sleep(_LOOK_S)
-        return controller.is_confirmed and controller.has_own_stop
+        return controller.is_certain
 
     def control_state(self) -> dict[str, str | bool]:
         """Return the lease and the state of STOP, as `urc.web.manage.wire.ControlState`."""

@@ -285,7 +285,8 @@ class StopResult(ManageMessage, frozen=True):
     latched: str
     """Name of the operator whose STOP is latched."""
     confirmed: bool
-    """Whether all the robot's transports have accepted the stop."""
+    """Whether all the robot's transports have accepted the stop, and the robot has answered all
+    cancellations of goals."""
 
 
 class ControlState(ManageMessage, frozen=True):

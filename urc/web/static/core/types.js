@@ -153,7 +153,7 @@
  * @property {number} left Time until the asking page gets the controls, in milliseconds.
  * @property {string} latched Name of the operator who pressed STOP; "" while nothing is latched.
  * @property {number} stops Number of STOPs so far.
- * @property {boolean} confirmed Whether the robot's transports have accepted the stop.
+ * @property {boolean} confirmed Whether the robot's transports have accepted the stop, and the robot has answered all cancellations of goals.
  * @property {boolean} drives Whether this page may drive.
  * @property {boolean} forces Whether this page may take control from another page.
  * @property {string} spare Key for the redundant socket; "" if the page may not open one.
