@@ -1,5 +1,6 @@
 """The drawer of a phone in landscape: the controls for which its layout has no place."""
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 
 import pytest
@@ -165,7 +166,9 @@ async def test_the_drawer_closes_in_each_way_and_none_of_them_is_stop(new_page: 
         assert not any(is_motion(text, "lift") for text in robot.line.texts)
 
 
-@pytest.mark.parametrize("how", ["its button", "Escape while a stick is held"])
+@pytest.mark.parametrize(
+    "how", ["its button", "Escape while a stick is held", "Escape while the robot moves by itself"]
+)
 async def test_stop_works_over_an_open_drawer(new_page: PageMaker, how: str) -> None:
     async with driven(robot=crowded()) as (robot, address):
         page = await lying(new_page, address)
@@ -173,6 +176,11 @@ async def test_stop_works_over_an_open_drawer(new_page: PageMaker, how: str) -> 
         await expect(page.locator(LIFT)).to_be_visible()
         if how == "its button":
             await page.locator(STOP).click()
+        elif how == "Escape while the robot moves by itself":
+            with robot.hub.moved_by("goal"):  # sent by any screen
+                await asyncio.sleep(0.5)
+                await page.keyboard.press("Escape")
+                await until(lambda: len(robot.latched) == 1)
         else:
             x, y = await centre(page, f"{STICK} >> nth=0")
             await page.mouse.move(x, y)

@@ -71,3 +71,24 @@ test("STOP is sent even if a widget throws an exception", () => {
   assert.throws(() => stop.press());
   assert.equal(sent, 1);
 });
+
+test("Escape is STOP first while a robot moves by itself, and otherwise answers no", () => {
+  const { drive, stop } = scene();
+  let sent = 0;
+  drive.stop = () => void (sent += 1);
+  let isMapMoving = false;
+  const found = () => (isMapMoving ? {} : null);
+  Object.assign(globalThis, { document: { querySelector: found } });
+  const press = () => {
+    let isPassed = true;
+    const keep = () => void (isPassed = false);
+    stop.escape(/** @type {any} */ ({ key: "Escape", repeat: false, preventDefault() {}, stopImmediatePropagation: keep }));
+    return isPassed;
+  };
+  assert.deepEqual([press(), sent], [true, 0]);
+  stop.moving = ["goto"];
+  assert.deepEqual([press(), sent], [false, 1]);
+  stop.moving = [];
+  isMapMoving = true; // a widget knows of a motion whose command is lost
+  assert.deepEqual([press(), sent], [false, 2]);
+});

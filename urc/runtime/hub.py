@@ -274,7 +274,9 @@ class Hub:
         self.progress: dict[str, SequenceProgress] = {}
         """Progress of each sequence, by name; sequences that have never run are missing."""
         self.progress_count = 0
-        """Number of sequence progress changes so far."""
+        """Number of changes of `progress` and `moving` so far."""
+        self.moving: dict[str, int] = {}
+        """Number of unanswered calls of each command that has started autonomous motion."""
         self.topic_lists: dict[str, TopicList] = {}
         """Newest list of the robot's topics, keyed by transport; empty without a connection."""
         self.topic_mismatches: tuple[TopicMismatch, ...] = ()
@@ -337,6 +339,23 @@ class Hub:
         if self.progress.get(progress.command) == progress:
             return
         self.progress[progress.command] = progress
+        self.progress_count += 1
+        self.revision += 1
+        self._wake()
+
+    @contextmanager
+    def moved_by(self, command: str) -> Iterator[None]:
+        """Count a command as one that moves the robot, while the context is open."""
+        self._count_motion(command, 1)
+        try:
+            yield
+        finally:
+            self._count_motion(command, -1)
+
+    def _count_motion(self, command: str, change: int) -> None:
+        count = self.moving.pop(command, 0) + change
+        if count > 0:
+            self.moving[command] = count
         self.progress_count += 1
         self.revision += 1
         self._wake()

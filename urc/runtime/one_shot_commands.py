@@ -34,6 +34,7 @@ __all__ = [
     "can_move",
     "needs_holding",
     "role_refusal",
+    "starts_motion",
 ]
 
 AGAIN_S = 1.0
@@ -83,7 +84,7 @@ def needs_holding(driver: Driver, command: str) -> bool:
     return known is not None and known.hold is not None
 
 
-def _moves(command: Command, arguments: Mapping[str, object]) -> bool:
+def starts_motion(command: Command, arguments: Mapping[str, object]) -> bool:
     """Return whether a command with these arguments starts autonomous motion."""
     if command.moves_if is None:
         return command.moves
@@ -142,7 +143,7 @@ class OneShotCommands:
         current number.
         """
         known = self.driver.commands.get(command)
-        if known is not None and _moves(known, arguments):
+        if known is not None and starts_motion(known, arguments):
             reason = self._controller().lease.interlock(client, stops)
             if reason:
                 return reason

@@ -300,9 +300,14 @@ class SequenceRow(msgspec.Struct, omit_defaults=False, frozen=True):
 
 
 class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True):
-    """The state of all sequences."""
+    """The state of all sequences, and the commands that now move the robot.
+
+    `moving` contains the unanswered commands and the running sequences with autonomous motion, of
+    all pages and programs.
+    """
 
     sequences: list[SequenceRow]
+    moving: list[str] = []
 
 
 class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):

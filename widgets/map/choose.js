@@ -5,28 +5,47 @@
  * A sent route is *active* until its command ends. If the operator ends it, STOP cancels it, or it
  * fails, the waypoints that are left are *kept*. The robot continues only after a new confirmation.
  *
+ * If the outcome is unknown, for example after the loss of a connection, the route is *lost*: it stays
+ * active, because the robot may go on. A route of another screen, or from before a reload, is known
+ * only from the robot's feedback; the operator can end it.
+ *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
  * @typedef {import("../../urc/web/static/core/types.js").Outlet} Outlet
+ *
+ * @typedef {object} ActiveRoute
+ * @property {Route} route
+ * @property {number} number Number of its command.
+ * @property {number} at Waypoint to which the robot is on its way, from 0.
+ * @property {number} serial Serial number of the feedback before the route.
+ * @property {"" | "pause" | "clear"} end Why the operator ends it.
+ * @property {boolean} isEnding Whether the request to end it is under way.
+ * @property {boolean} isLost Whether its outcome is unknown.
+ * @property {ActiveRoute | null} before The route that it replaces, until the robot has accepted it.
  */
 import { attribute, button, write } from "urc/kit";
+import { Feedback } from "./feedback.js";
 import { distance, distanceText, isInside, lengthOf, placeText, wrapped } from "./geo.js";
 import { Route } from "./route.js";
 import { RouteList } from "./route_list.js";
 
 /** Time after which a command counts as one that takes long, such as a goal, in milliseconds. */
 const SOON_MS = 1000;
+/** Time after which a route that does not end can be ended again, in milliseconds. */
+const END_MS = 3000;
+/** Codes of failures after which the robot may still be on its way. */
+const UNKNOWN = ["disconnected", "timed-out", "stopped"];
 /** Turn of one press, in radians. */
 const STEP = Math.PI / 12;
 
 export class Choice {
   /**
    * @param {HTMLElement} root
-   * @param {Pick<Context, "t" | "send" | "signal">} ctx
+   * @param {Pick<Context, "t" | "send" | "signal" | "onStop">} ctx
    * @param {{isLocal: boolean, form: "decimal" | "dms", fence: readonly Place[], changed: () => void, turns: ReadonlySet<string>}} given
    *   `turns` are the outputs that take a direction.
    */
-  constructor(root, { t, send, signal }, { isLocal, form, fence, changed, turns }) {
+  constructor(root, { t, send, signal, onStop }, { isLocal, form, fence, changed, turns }) {
     this.t = t;
     this.send = send;
     this.isLocal = isLocal;
@@ -49,15 +68,17 @@ export class Choice {
     /** Route that the operator edits. */
     this.route = new Route();
     /**
-     * Sent route whose command has not ended. `at` is the waypoint to which the robot is on its way;
-     * `serial` is that of the progress before the route; `end` is why the operator ends it.
-     * @type {{route: Route, number: number, at: number, serial: number, end: "" | "pause" | "clear"} | null}
+     * Sent route whose command has not ended.
+     * @type {ActiveRoute | null}
      */
     this.active = null;
     /** Waypoints that are left of a route that has ended early. @type {Route | null} */
     this.kept = null;
-    /** Serial number of the newest progress. */
-    this.serial = 0;
+    this.feedback = new Feedback();
+    /** Timer for the end of feedback that the driver does not limit. @type {number | undefined} */
+    this.timer = undefined;
+    /** Whether the operator ends a route that this page did not send. */
+    this.isEnding = false;
     /** @type {Place | null} */
     this.robot = null;
     this.outcome = "";
@@ -83,13 +104,18 @@ export class Choice {
     this.no = this.button(t("Cancel"), () => this.clear(), signal);
     this.drop = this.button(t("Clear"), () => void this.forget(), signal);
     this.pause = this.button(t("Pause"), () => void this.finish("pause"), signal);
+    this.stopRoute = this.button(t("End route"), () => void this.endOther(), signal);
     this.undo = this.button(t("Undo"), () => this.back(), signal);
     this.left = this.button("↺", () => this.turn(STEP), signal, t("Turn left by 15°"));
     this.right = this.button("↻", () => this.turn(-STEP), signal, t("Turn right by 15°"));
     this.yes = this.button("", () => void this.go(), signal);
     this.yes.classList.add("map-yes");
-    this.bar.append(this.words, this.list.element, this.no, this.drop, this.undo, this.left, this.right, this.pause, this.yes);
+    this.bar.append(this.words, this.list.element, this.no, this.drop, this.undo, this.left, this.right, this.stopRoute, this.pause, this.yes);
     root.append(this.bar);
+    onStop(({ phase }) => {
+      if (phase === "confirmed" && this.active?.isLost) this.leftOver(this.active); // STOP has ended it
+    });
+    signal.addEventListener("abort", () => clearTimeout(this.timer));
     this.show();
   }
 
@@ -107,23 +133,23 @@ export class Choice {
    * @param {Readonly<Record<string, Outlet>>} outputs
    * @param {Place | null} robot
    * @param {number | null} yaw direction of the robot
-   * @param {{value: number, serial: number} | null} progress number of the waypoint to which the robot is on its way
+   * @param {import("./feedback.js").Told | null} progress
    */
   update(outputs, robot, yaw, progress) {
     this.goto = outputs["goto"];
     this.waypoints = outputs["waypoints"];
     this.pose = outputs["initial_pose"];
     this.end = outputs["end_route"];
+    this.feedback.take(progress);
     if (progress) this.advance(progress);
     this.robotYaw = yaw;
     this.robot = robot;
     this.show();
   }
 
-  /** Note the progress of the active route. @param {{value: number, serial: number}} progress */
+  /** Note the progress of the active route. @param {import("./feedback.js").Told} progress */
   advance({ value, serial }) {
     const { active } = this;
-    this.serial = serial;
     if (!active || serial <= active.serial) return; // told of an earlier route
     const at = Math.min(Math.max(0, Math.round(value)), active.route.size - 1);
     if (at === active.at) return;
@@ -277,16 +303,71 @@ export class Choice {
    */
   async finish(end) {
     const { active } = this;
-    if (!active || active.end) return;
+    if (!active || active.isEnding) return;
     active.end = end;
+    active.isEnding = true;
     this.show();
+    const isSent = await this.sendEnd();
+    if (this.active !== active) return;
+    if (!isSent) {
+      active.end = ""; // the robot goes on, so the buttons remain
+      active.isEnding = false;
+    } else if (active.isLost) {
+      this.leftOver(active); // no command is left whose end could be awaited
+    } else {
+      setTimeout(() => this.endAgain(active), END_MS);
+    }
+    this.show();
+  }
+
+  /** Let the operator end a route again that has not ended. @param {ActiveRoute} active */
+  endAgain(active) {
+    if (this.active !== active || !active.isEnding) return;
+    active.isEnding = false;
+    this.outcome = `▲ ${this.t("The robot has not ended the route. Try again, or press STOP.")}`;
+    this.show();
+  }
+
+  /** End a route that this page has not sent, or no longer knows. */
+  async endOther() {
+    if (this.isEnding) return;
+    this.isEnding = true;
+    this.show();
+    if (await this.sendEnd()) {
+      this.feedback.end(); // newer feedback shows the button again
+      this.outcome = `✓ ${this.t("sent")}`;
+    }
+    this.isEnding = false;
+    this.edited();
+  }
+
+  /** Send the end of the route; return whether that succeeded. */
+  async sendEnd() {
+    this.outcome = "";
     try {
       await this.send("end_route", {});
     } catch (error) {
-      active.end = ""; // the robot goes on, so the buttons remain
       this.outcome = `▲ ${error instanceof Error ? error.message : error}`;
+      return false;
     }
-    this.show();
+    return true;
+  }
+
+  /** Take a lost route as ended. @param {ActiveRoute} active */
+  leftOver(active) {
+    this.active = null;
+    this.feedback.end();
+    if (active.end !== "clear") this.keep(active.route.rest(active.at));
+    this.outcome = active.end === "pause" ? this.t("Paused") : "";
+    this.edited();
+  }
+
+  /** Whether the robot's feedback tells of a route that this page has not sent. */
+  isOther() {
+    clearTimeout(this.timer);
+    const leftS = this.active || !this.end ? 0 : this.feedback.leftS(performance.now() / 1000);
+    if (leftS > 0 && leftS < Infinity) this.timer = window.setTimeout(() => this.show(), leftS * 1000 + 50);
+    return leftS > 0;
   }
 
   /** Return the reason why the choice cannot be sent, or "". */
@@ -301,11 +382,13 @@ export class Choice {
     const { mode, places, t } = this;
     const isWay = mode === "way" || mode === "sure";
     const isIdle = mode === "look" && !this.aiming;
-    const [active, kept] = [isIdle ? this.active : null, isIdle && !this.active ? this.kept : null];
+    const isOther = this.isOther();
+    const [active, kept] = [isIdle ? this.active : null, isIdle && !this.active && !isOther ? this.kept : null];
     const isTurned = (mode === "place" && this.yaw !== null) || (mode === "way" && places.length > 0 && this.turns.has("waypoints"));
     const hide = (/** @type {Element} */ part, /** @type {boolean} */ isShown) => attribute(part, "hidden", isShown ? null : "");
     const disable = (/** @type {Element} */ part, /** @type {boolean} */ isOff) => attribute(part, "disabled", isOff ? "" : null);
-    hide(this.bar, !isIdle || this.outcome !== "" || active !== null || kept !== null);
+    attribute(this.bar, "data-moving", this.active || isOther ? "" : null); // Escape is then STOP
+    hide(this.bar, !isIdle || this.outcome !== "" || active !== null || kept !== null || isOther);
     hide(this.no, !isIdle);
     disable(this.no, this.isBusy);
     for (const one of [this.left, this.right]) {
@@ -315,7 +398,10 @@ export class Choice {
     hide(this.undo, isWay);
     disable(this.undo, places.length === 0 || this.isBusy);
     const canEnd = active !== null && this.end !== undefined;
-    const isEnding = active !== null && (active.end !== "" || (this.end?.reason ?? "") !== "");
+    const cannotEnd = (this.end?.reason ?? "") !== "";
+    const isEnding = active !== null && (active.isEnding || cannotEnd);
+    hide(this.stopRoute, isIdle && isOther);
+    disable(this.stopRoute, this.isEnding || cannotEnd);
     hide(this.pause, canEnd);
     disable(this.pause, isEnding);
     hide(this.drop, canEnd || kept !== null || (mode === "way" && places.length > 0));
@@ -329,7 +415,8 @@ export class Choice {
     write(this.yes, mode === "place" && this.target === "initial_pose" ? t("It is here") : send);
     attribute(this.bar, "data-mode", mode);
     const text = reason && places.length > 0 ? `▲ ${reason}` : this.question();
-    write(this.words, this.outcome ? [this.outcome, kept ? text : ""].filter(Boolean).join(" · ") : text);
+    const isToldToo = kept !== null || active?.isLost || (isIdle && isOther);
+    write(this.words, this.outcome ? [this.outcome, isToldToo ? text : ""].filter(Boolean).join(" · ") : text);
   }
 
   /** @param {boolean} isShown */
@@ -362,7 +449,12 @@ export class Choice {
     const names = { count: places.length, length: distanceText(lengthOf(places, isLocal)) };
     if (mode === "sure") return t("Send the robot to {count} places in order ({length})?", names);
     if (mode === "look" && this.aiming) return t("Press on the place, and drag in the direction.");
-    if (mode === "look" && active) return t("On the way to waypoint {number} of {count}", { number: active.at + 1, count: active.route.size });
+    if (mode === "look" && active) {
+      const way = { number: active.at + 1, count: active.route.size };
+      return active.isLost ? t("The robot may still be on its way to waypoint {number} of {count}", way) : t("On the way to waypoint {number} of {count}", way);
+    }
+    const { told } = this.feedback;
+    if (mode === "look" && told && this.isOther()) return t("On the way to waypoint {number}", { number: told.value + 1 });
     if (mode === "look" && kept) return t("Waypoints left: {count}", names);
     if (mode !== "way") return "";
     if (places.length > 0) return t("{count} places, {length}", names);
@@ -382,7 +474,9 @@ export class Choice {
     const number = (this.sent += 1);
     const given = isPlace ? this.one() : this.all();
     if (!isPlace) {
-      this.active = { route: this.route.rest(0), number, at: 0, serial: this.serial, end: "" };
+      const { serial } = this.feedback;
+      const before = this.active;
+      this.active = { route: this.route.rest(0), number, at: 0, serial, end: "", isEnding: false, isLost: false, before };
     }
     this.isBusy = true;
     this.outcome = `… ${this.t("sending")}`;
@@ -392,7 +486,8 @@ export class Choice {
       await this.send(isPlace ? this.target : "waypoints", given);
       this.ended(number, "");
     } catch (error) {
-      this.ended(number, `▲ ${error instanceof Error ? error.message : error}`);
+      const code = error instanceof Error ? String(Reflect.get(error, "code") ?? "") : "";
+      this.ended(number, `▲ ${error instanceof Error ? error.message : error}`, UNKNOWN.includes(code));
     } finally {
       clearTimeout(timer);
     }
@@ -404,6 +499,7 @@ export class Choice {
     const isRoute = this.active?.number === number;
     this.isBusy = false;
     if (isRoute) this.kept = null;
+    if (isRoute && this.active) this.active.before = null;
     this.clear();
     this.outcome = isRoute && this.end ? "" : `… ${this.t("on the way")}`;
     this.show();
@@ -414,14 +510,21 @@ export class Choice {
    *
    * @param {number} number
    * @param {string} fault "" if the robot has done it
+   * @param {boolean} [isUnknown] whether the robot may go on nevertheless
    */
-  ended(number, fault) {
+  ended(number, fault, isUnknown = false) {
+    if (this.active?.before?.number === number) this.active.before = null;
+    if (isUnknown && this.end && this.active?.number === number) {
+      this.lose(number, fault);
+      return;
+    }
     const isLast = number === this.sent;
     const isQuick = isLast && this.isBusy;
     const { active } = this;
     const end = active?.number === number ? active.end : "";
     if (active?.number === number) {
-      this.active = null;
+      this.active = fault && isQuick ? active.before : null;
+      this.feedback.end();
       if (!fault && isQuick) this.kept = null;
       if (fault && !isQuick && this.end && end !== "clear") this.keep(active.route.rest(active.at));
     }
@@ -431,6 +534,22 @@ export class Choice {
       const done = isQuick ? `✓ ${this.t("sent")}` : this.t("✓ done");
       this.outcome = end === "" || !fault ? fault || done : end === "pause" ? this.t("Paused") : "";
     }
+    this.edited();
+  }
+
+  /**
+   * Keep a route active whose outcome is unknown.
+   *
+   * @param {number} number
+   * @param {string} fault
+   */
+  lose(number, fault) {
+    this.leave(number);
+    const { active } = this;
+    if (!active) return;
+    active.isLost = true;
+    active.isEnding = false;
+    if (this.mode === "look" && !this.aiming) this.outcome = fault;
     this.edited();
   }
 

@@ -321,8 +321,7 @@ class Chart {
     const points = drawn.map(({ serial, state }) => `${serial}${state}`).join();
     if (points !== this.seenPoints) this.grid?.ask();
     this.seenPoints = points;
-    const [waypoint, serial] = [number(readings["waypoint"]), readings["waypoint"]?.serial ?? 0];
-    this.choice?.update(outputs, place, yaw, waypoint === null ? null : { value: waypoint, serial });
+    this.choice?.update(outputs, place, yaw, feedbackOf(readings["waypoint"]));
   }
 
   /** Write the place of the robot, and what is wrong with it or with the grids. */
@@ -433,6 +432,19 @@ class Chart {
 
 /** Maximum number of waypoints with numbers on the map; more numbers would cover each other. */
 const NUMBERED = 30;
+
+/**
+ * Return the robot's feedback about a route; null without a value.
+ *
+ * @param {Reading | undefined} reading
+ * @returns {import("./feedback.js").Told | null}
+ */
+function feedbackOf(reading) {
+  const value = number(reading);
+  if (!reading || value === null) return null;
+  const { serial, time, state, signal } = reading;
+  return { value: Math.max(0, Math.round(value)), serial, time, isLive: state === "live", hasLimit: (signal.stale_after_s ?? 0) > 0 };
+}
 
 const RANK = ["live", "stale", "gone", "none"];
 

@@ -8,11 +8,11 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
-from tests.e2e.motion.driving import centre
+from tests.e2e.motion.driving import STOP, centre
 from tests.e2e.widgets.test_map import AT, POSE, drag
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
@@ -35,13 +35,15 @@ class Follower(FakeRobot):
     """A robot whose route ends when the test ends it, or by the command that stops the robot."""
 
     way: asyncio.Future[None] | None = None
+    is_deaf = False
+    """Whether the robot ignores the end of its route."""
 
     async def command(self, name: str, arguments: Mapping[str, Reading], **more: Any) -> Replied:
         reply = await super().command(name, arguments, **more)
         if name == "follow":
             self.way = asyncio.get_running_loop().create_future()
             await self.way
-        elif self.way is not None and not self.way.done():
+        elif self.way is not None and not self.way.done() and not self.is_deaf:
             self.cancel()
         return reply
 
@@ -192,6 +194,119 @@ async def test_a_route_that_cannot_be_ended_stays_active(new_page: PageMaker) ->
         await press(page, "Pause")
         await until_text(page, ".map-words", "▲ no answer within 2 s")
         await expect(page.get_by_role("button", name="Pause", exact=True)).to_be_enabled()
+
+
+async def lost(page: Page, robot: Follower) -> None:
+    """Send a route, and lose the robot on the way to the second waypoint."""
+    await drawn(page, (1, 0), (2, 0), (3, 1))
+    await sent(page, robot)
+    robot.set_reading("waypoint", 1)
+    await until_text(page, ".map-words", "On the way to waypoint 2 of 3")
+    assert robot.way is not None
+    robot.way.set_exception(CommandFailed("disconnected", "the connection is lost"))
+    await until_text(
+        page,
+        ".map-words",
+        "▲ the connection is lost · The robot may still be on its way to waypoint 2 of 3",
+    )
+
+
+def button(page: Page, name: str) -> Locator:
+    return page.get_by_role("button", name=name, exact=True)
+
+
+@pytest.mark.parametrize("name", ["Pause", "Clear", "STOP"])
+async def test_a_route_with_an_unknown_outcome_can_be_ended(new_page: PageMaker, name: str) -> None:
+    """It does not count as ended, so that nobody continues a route that is under way."""
+    page = await new_page(size="desktop")
+    async with followed(page) as robot:
+        await lost(page, robot)
+        await expect(button(page, "Continue …")).to_be_hidden()
+        robot.set_reading("waypoint", 2)
+        await expect(page.locator(".map-mark")).to_have_text(["3"])
+        if name == "STOP":
+            await page.click(STOP)
+        else:
+            await press(page, name)
+        await until(lambda: ("end", {}) in robot.commands)
+        if name == "Clear":
+            await until_attribute(page, ".map-bar", "hidden", "")
+            await expect(page.locator(".map-mark")).to_have_count(0)
+        else:
+            await expect(page.locator(".map-words")).to_contain_text("Waypoints left: 1")
+            await expect(button(page, "Continue …")).to_be_visible()
+        assert len(robot.routes) == 1
+
+
+async def test_a_route_that_goes_on_after_pause_can_be_ended_again(new_page: PageMaker) -> None:
+    page = await new_page(size="desktop")
+    async with followed(page) as robot:
+        robot.is_deaf = True
+        await drawn(page, (1, 0), (2, 0))
+        await sent(page, robot)
+        await until_text(page, ".map-words", "On the way to waypoint 1 of 2")
+        await press(page, "Pause")
+        await until(lambda: ("end", {}) in robot.commands)
+        await expect(button(page, "Pause")).to_be_disabled()
+        await expect(page.locator(".map-words")).to_contain_text("has not ended the route")
+        robot.is_deaf = False
+        await press(page, "Pause")
+        await until_text(page, ".map-words", "Paused · Waypoints left: 2")
+
+
+async def test_a_route_is_ended_after_a_reload_and_from_another_screen(
+    new_page: PageMaker,
+) -> None:
+    """The robot's feedback tells of the route; its end needs newer feedback to be doubted."""
+    page = await new_page(size="desktop")
+    async with followed(page) as robot:
+        await drawn(page, (1, 0), (2, 0))
+        await sent(page, robot)
+        robot.set_reading("waypoint", 1)
+        await until_text(page, ".map-words", "On the way to waypoint 2 of 2")
+        await expect(button(page, "End route")).to_be_hidden()
+        await page.reload()
+        await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+        robot.set_reading("waypoint", 1)
+        await until_text(page, ".map-words", "On the way to waypoint 2")
+        await press(page, "End route")
+        await until(lambda: robot.commands[1:] == [("end", {})])
+        await expect(button(page, "End route")).to_be_hidden()
+        robot.set_reading("waypoint", 1)
+        await expect(button(page, "End route")).to_be_visible()
+
+
+async def test_escape_is_stop_while_a_route_is_under_way_even_with_a_choice_on_the_map(
+    new_page: PageMaker,
+) -> None:
+    """Without a route, it takes the choice back."""
+    page, other = await new_page(size="desktop"), await new_page(size="desktop")
+    async with followed(page) as robot:
+        await other.goto(page.url)
+        await until_text(other, ".map-text", "x 0.00 m, y 0.00 m")
+        await drawn(other, (1, 1))
+        await other.locator(".map-area").focus()
+        await other.keyboard.press("Escape")
+        await expect(other.locator(".map-mark")).to_have_count(0)
+        assert robot.latched == []
+        await drawn(page, (1, 0), (2, 0))
+        await sent(page, robot)
+        await until_text(page, ".map-words", "On the way to waypoint 1 of 2")
+        await drawn(other, (1, 1))
+        await other.locator(".map-area").focus()
+        await other.keyboard.press("Escape")
+        await until(lambda: len(robot.latched) == 1)
+        await until_text(other, "[data-latched-text]", "■ Stopped by you")
+
+
+async def test_escape_is_stop_while_a_route_may_be_under_way(new_page: PageMaker) -> None:
+    page = await new_page(size="desktop")
+    async with followed(page) as robot:
+        await lost(page, robot)
+        await press(page, "Draw a route")
+        await page.locator(".map-area").focus()
+        await page.keyboard.press("Escape")
+        await until(lambda: len(robot.latched) == 1)
 
 
 async def test_a_route_by_keys_alone(new_page: PageMaker) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from tests.unit.web.test_client import frames_in
 from urc.model.values import Sample, Signal
-from urc.runtime.hub import STREAM_KEPT, Hub, LogEntry
+from urc.runtime.hub import STREAM_KEPT, Hub, LogEntry, SequenceProgress
 from urc.testing.clock import FakeClock, settle
 from urc.web.feed.fanout import Fanout, FanoutPosition, Pacer, Place
 
@@ -202,6 +202,31 @@ def test_lines_of_the_log_come_while_values_stream() -> None:
         fanout.flush()
     said = [[message["t"] for message in messages_in(frames)] for frames in client.frames]
     assert said == [["v"], ["v", "log"], ["v", "log"]]
+
+
+def test_pages_are_told_of_all_commands_and_sequences_that_move_the_robot() -> None:
+    """From their start to their end, whoever sent them; a newcomer is told, too."""
+    clock = FakeClock()
+    hub = Hub({})
+    fanout = Fanout(hub, clock=clock, movers=["dance"])
+    client = Watcher(fanout)
+
+    def told(watcher: Watcher) -> object:
+        fanout.flush()
+        watcher.take()
+        messages = messages_in(b"".join(watcher.frames))
+        return [one["moving"] for one in messages if one["t"] == "progress"][-1]
+
+    with hub.moved_by("goto"), hub.moved_by("goto"):
+        assert told(client) == ["goto"]
+        hub.set_progress(SequenceProgress("log", 1, 2, "running"))
+        hub.set_progress(SequenceProgress("dance", 1, 2, "running"))
+        assert told(client) == ["dance", "goto"]
+        assert told(Watcher(fanout)) == ["dance", "goto"]
+    hub.set_progress(SequenceProgress("dance", 2, 2, "paused"))
+    assert told(client) == ["dance"]
+    hub.set_progress(SequenceProgress("dance", 2, 2, "idle"))
+    assert told(client) == []
 
 
 def test_a_client_that_left_is_not_woken() -> None:

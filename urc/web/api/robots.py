@@ -39,7 +39,7 @@ from urc.web.api.wire import (
     RobotList,
     SignalValues,
 )
-from urc.web.drive.command_runner import CommandOutcome
+from urc.web.drive.command_runner import COMMAND_TIMEOUT_S, CommandOutcome
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.fleet import service_of
 from urc.web.fleet.robots import LiveSession, RobotService
@@ -234,7 +234,7 @@ class RobotCalls:
             run = CommandRequest(
                 0, wanted, asked.arguments, self._confirmation(session, asked, wanted), asked.stops
             )
-            timeout_s = asked.timeout_s or (LONGEST_TIMEOUT_S if known.steps else None)
+            timeout_s = asked.timeout_s or (LONGEST_TIMEOUT_S if known.steps else COMMAND_TIMEOUT_S)
             outcome = await service.commands.run(
                 operator, run, session.live.session, timeout_s=timeout_s
             )

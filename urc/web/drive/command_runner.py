@@ -7,15 +7,22 @@ exactly one outcome and one audit log entry.
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, NamedTuple, Protocol
 
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Replied
+from urc.protocol.requests.bounds import longest_s
 from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock
-from urc.runtime.one_shot_commands import OUT_OF_SCOPE, CommandRefused, role_refusal
+from urc.runtime.hub import Hub
+from urc.runtime.one_shot_commands import (
+    OUT_OF_SCOPE,
+    CommandRefused,
+    role_refusal,
+    starts_motion,
+)
 from urc.runtime.session import CommandFailed
 from urc.web.drive.control_service import ControlService, OperatorSession
 from urc.web.drive.two_person import TwoPersonRule
@@ -24,11 +31,15 @@ from urc.wire.client_messages import CommandRequest
 __all__ = ["COMMAND_TIMEOUT_S", "CommandOutcome", "CommandRunner", "CommandTarget"]
 
 COMMAND_TIMEOUT_S: Final = 30.0
-"""Longest wait for the reply to a command, in seconds; a sequence has no limit."""
+"""Longest wait for the reply to a command that does not declare a longer one, in seconds."""
 
 
 class CommandTarget(Protocol):
-    """The methods of a robot's session that run commands and sequences."""
+    """The part of a robot's session that runs commands and sequences."""
+
+    @property
+    def hub(self) -> Hub:
+        """The hub with the values that all pages see."""
 
     async def command(
         self,
@@ -78,8 +89,8 @@ class CommandRunner:
             operator: the session of the page or program that sends the command.
             asked: the command with its arguments.
             target: the open session of the robot.
-            timeout_s: longest wait for the reply, in seconds. None means `COMMAND_TIMEOUT_S` for a
-                command and no limit for a sequence.
+            timeout_s: longest wait for the reply, in seconds. None means the time that the driver
+                declares for a command, at least `COMMAND_TIMEOUT_S`, and no limit for a sequence.
         """
         sent: deque[Payload] = deque(maxlen=1)  # the last sent frame
         people: tuple[str, ...] = ()
@@ -87,7 +98,10 @@ class CommandRunner:
         try:
             people = await self._confirmed(operator, asked)
             async with asyncio.timeout(limit_s):
-                with self._ended_with_right(operator, asked.command, target):
+                with (
+                    self._ended_with_right(operator, asked.command, target),
+                    self._shown_as_motion(asked, target),
+                ):
                     replied = await target.command(
                         asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
                     )
@@ -137,9 +151,21 @@ class CommandRunner:
         finally:
             operator.on_role.discard(check)
 
+    def _shown_as_motion(
+        self, asked: CommandRequest, target: CommandTarget
+    ) -> AbstractContextManager[None]:
+        """Tell all pages of autonomous motion until the reply to its command."""
+        known = self._controls.once.driver.commands.get(asked.command)
+        if known is None or not starts_motion(known, asked.arguments):
+            return nullcontext()
+        return target.hub.moved_by(asked.command)
+
     def _limit_s(self, command: str) -> float | None:
-        known = self._controls.once.driver.commands.get(command)
-        return None if known is not None and known.steps else COMMAND_TIMEOUT_S
+        driver = self._controls.once.driver
+        known = driver.commands.get(command)
+        if known is not None and known.steps:
+            return None
+        return max(COMMAND_TIMEOUT_S, longest_s(driver, command))
 
     async def _confirmed(self, operator: OperatorSession, asked: CommandRequest) -> tuple[str, ...]:
         """Return the names of the people who confirmed a command, or raise `CommandFailed`."""

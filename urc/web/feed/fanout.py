@@ -96,8 +96,17 @@ class Fanout:
         rate_hz: float = FRAMES_PER_SECOND,
         clock: Clock | None = None,
         each: Iterable[str] = (),
+        movers: Iterable[str] = (),
     ) -> None:
-        """Create the fan-out; `each` contains the signals for which every reading is sent."""
+        """Create the fan-out.
+
+        Args:
+            hub: the values of the session.
+            rate_hz: largest rate of flushes, in hertz.
+            clock: source of time; None for the clock of the running event loop.
+            each: the signals for which every reading is sent.
+            movers: the sequences with autonomous motion.
+        """
         hub.streams.watch(each)
         self.hub = hub
         self._wakes: set[Callable[[], None]] = set()
@@ -114,6 +123,7 @@ class Fanout:
         self._loop: asyncio.AbstractEventLoop | None = None
         """The event loop while `run` is active."""
         self._broken: asyncio.Future[None] | None = None
+        self._movers = frozenset(movers)
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.cache = ImageCache(hub, self._clock)
 
@@ -199,7 +209,8 @@ class Fanout:
         if hub.notes_count > notes:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
-            messages.append(encode_progress(tuple(hub.progress.values())).encode())
+            sequences = tuple(hub.progress.values())
+            messages.append(encode_progress(sequences, self._moving()).encode())
         if mismatches != hub.mismatches_count:
             messages.append(encode_topics(hub.topic_mismatches).encode())
         after = FanoutPosition(
@@ -212,6 +223,11 @@ class Fanout:
         )
         frames = b"".join([as_frame(message, is_text=True) for message in messages])
         return _Update(after, frames, now_s)
+
+    def _moving(self) -> list[str]:
+        """Return the commands and sequences that now move the robot, in order of their names."""
+        running = {name for name, one in self.hub.progress.items() if one.state != "idle"}
+        return sorted({*self.hub.moving, *(running & self._movers)})
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         """Remove images, which are sent separately; keep samples without a value."""

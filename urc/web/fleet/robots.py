@@ -430,7 +430,9 @@ class RobotService:
 
     async def _serve(self, session: SessionLike) -> None:
         each = keep_all_signals(self.robot.profile)
-        fanout = Fanout(session.hub, clock=self.clock, each=each)
+        commands = self.robot.profile.driver.commands
+        movers = [name for name, one in commands.items() if one.moves and one.steps]
+        fanout = Fanout(session.hub, clock=self.clock, each=each, movers=movers)
         topics = TopicWatch(self.robot.profile, dict(self.robot.settings), session, self.clock)
         number, now_s = secrets.token_hex(8), self.clock.now()
         live = LiveSession(session, fanout, number, asyncio.Event(), now_s, topics)

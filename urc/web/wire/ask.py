@@ -53,13 +53,14 @@ def encode_token(run: int, token: str) -> str:
     return encoded(TokenMessage(run, token))
 
 
-def encode_progress(all_progress: tuple[SequenceProgress, ...]) -> str:
-    """Return the message with the states of all sequences."""
+def encode_progress(all_progress: tuple[SequenceProgress, ...], moving: list[str]) -> str:
+    """Return the message with the states of all sequences and the commands that move the robot."""
     return encoded(
         ProgressMessage(
             [
                 SequenceRow(one.command, one.place, one.of, one.state, cut(one.reason))
                 for one in all_progress
-            ]
+            ],
+            moving,
         )
     )

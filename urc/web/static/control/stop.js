@@ -26,6 +26,8 @@ export class StopButton {
     /** @type {Set<(state: StopState) => void>} */
     this.listeners = new Set();
     this.seen = "";
+    /** Commands and sequences with autonomous motion under way, of all screens. @type {readonly string[]} */
+    this.moving = [];
     /** Called at each press on this or another page. */
     this.onPressed = () => {};
     if (hasKeys) {
@@ -42,9 +44,14 @@ export class StopButton {
     }
   }
 
-  /** Handle Escape, which means only STOP during a hold. @param {KeyboardEvent} event */
+  /** Whether the robot moves, as far as this page knows: by a held control, or by itself. */
+  get isMotion() {
+    return this.input.isDriving() || this.moving.length > 0 || document.querySelector("[data-moving]") !== null;
+  }
+
+  /** Handle Escape, which means only STOP during motion. @param {KeyboardEvent} event */
   escape(event) {
-    if (event.key !== "Escape" || event.repeat || !this.input.isDriving()) return;
+    if (event.key !== "Escape" || event.repeat || !this.isMotion) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     this.press();

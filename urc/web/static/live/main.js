@@ -225,6 +225,7 @@ function take(message) {
       store.hello(message, nowMs);
       session = message.session;
       sequences = {};
+      stop.moving = [];
       screenName.tell();
       alarms.clear();
       shown = "[]"; // a new connection sends no images before a request
@@ -248,6 +249,7 @@ function take(message) {
       break;
     case "progress":
       sequences = Object.fromEntries(message.sequences.map((/** @type {import("../core/types.js").Progress} */ one) => [one.command, one]));
+      stop.moving = message.moving;
       break;
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
@@ -340,7 +342,15 @@ function settle(reply) {
   const asked = waiting.get(reply.id);
   waiting.delete(reply.id);
   if (reply.ok) asked?.resolve(reply.values ?? {});
-  else asked?.reject(new Error(said(reply.message ?? reply.code ?? t("the command was not run"))));
+  else asked?.reject(failure(said(reply.message ?? reply.code ?? t("the command was not run")), reply.code ?? ""));
+}
+
+/**
+ * @param {string} message
+ * @param {string} code code of the failure; widgets decide with it whether the robot may still act
+ */
+function failure(message, code) {
+  return Object.assign(new Error(message), { code });
 }
 
 /**
@@ -349,7 +359,7 @@ function settle(reply) {
  */
 function giveUpCommands() {
   for (const { reject } of waiting.values()) {
-    reject(new Error(t("Connection to URC lost: the result is unknown")));
+    reject(failure(t("Connection to URC lost: the result is unknown"), "disconnected"));
   }
   waiting.clear();
   meant.clear();
