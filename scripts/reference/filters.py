@@ -88,6 +88,7 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
 """For each filter: an example expression, and the meaning of the filter's result."""
 _OPERATORS = (
     ("`+` `-` `*` `/` `//` `%` `**`", "arithmetic; `+` also joins texts or bytes"),
+    ("`'M ' ~ speed`", "text of both values, joined"),
     ("`==` `!=` `<` `<=` `>` `>=`", "comparisons"),
     ("`and` `or` `not`", "logic"),
     ("`x in [1, 2]`", "membership"),

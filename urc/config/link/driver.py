@@ -35,6 +35,7 @@ __all__ = ["NameUses", "link_driver", "link_simulator"]
 
 
 _ONE_SETTING: Final = re.compile(r"\{\{\s*settings\.([a-z]\w*)\s*\}\}")
+_LEVELS: Final = ("info", "warning", "error")
 _NUMBERS: Final = ("port", "integer", "number")
 
 
@@ -176,11 +177,20 @@ class _Linker:
         for place, template in form.templates(inner, spec):
             self.template(place, template, known)
 
-    def template(self, part: Node, template: Template, known: Iterable[str] = ()) -> None:
-        """Check every name in a template."""
+    def template(
+        self,
+        part: Node,
+        template: Template,
+        known: Iterable[str] = (),
+        *,
+        words: Iterable[str] = (),
+    ) -> None:
+        """Check every name in a template; a name among `words` is probably text without quotes."""
         allowed = {*known, "settings"}
         for used in sorted(template.names - allowed):
             name, hint = self._meant(used, allowed - {COUNTERS, NONCE})
+            if used in words:
+                hint = f"text in an expression needs quotes of its own: \"'{used}'\""
             self._unknown(
                 part,
                 template,
@@ -293,7 +303,7 @@ def link_driver(
             known = (*message.read.fields, *driver.signals, *said_on(driver, message.transport))
             linker.template(line.must("text"), message.log.text, known)
             if message.log.level is not None:
-                linker.template(line.must("level"), message.log.level, known)
+                linker.template(line.must("level"), message.log.level, known, words=_LEVELS)
     return linker.uses
 
 

@@ -1,4 +1,4 @@
-"""Finds undeclared motion, and autonomous motion without a stop command or a confirmation.
+"""Finds undeclared motion and stops, and autonomous motion without a stop or a confirmation.
 
 A command may suggest motion by its name, by its arguments' units and names, or by its message type.
 Only whole words match: ``moves_left`` does not match ``move``.
@@ -12,7 +12,7 @@ from urc.config.node import Node, Problems
 from urc.model.driver import Command, Driver
 from urc.model.units import quantity_of
 
-__all__ = ["check_unguarded", "check_unmarked", "why_it_moves"]
+__all__ = ["check_unguarded", "check_unmarked", "check_unmarked_stop", "why_it_moves"]
 
 
 def _words(text: str) -> frozenset[str]:
@@ -36,6 +36,8 @@ _QUIET: Final = _words(
     " state status stop store subscribe test timeout trim tune unlock version volume zero"
 )
 """Words that rule out motion, such as ``mode`` in ``drive_mode``."""
+_STOPS: Final = frozenset(("e stop", "emergency stop", "estop", "halt", "stop", "stop all"))
+"""Whole names of commands that stop a robot."""
 _BOUND: Final = _words("limit max maximum min minimum top")
 """Words in the names of arguments that limit motion."""
 _MOVING_ARGUMENTS: Final = _words("omega rudder steering throttle thrust velocity vx vy vz")
@@ -70,6 +72,29 @@ def check_unmarked(part: Node, driver: Driver, problems: Problems) -> None:
                     key=True,
                     hint=_HINT if key == "commands" else _HINT_OF_STEPS,
                 )
+
+
+def check_unmarked_stop(part: Node, driver: Driver, problems: Problems) -> None:
+    """Warn about a stop of a robot with held commands that STOP does not run.
+
+    If another command is marked with `stop`, its author knows the key.
+    """
+    commands = driver.commands.values()
+    if any(one.stops for one in commands) or all(one.hold is None for one in commands):
+        return
+    for name, inner in part.named("commands").items():
+        command = driver.commands[name]
+        is_told = isinstance(inner.data, dict) and "stop" in inner.data
+        if is_told or command.hold is not None or command.moves:
+            continue
+        if " ".join(words_of(name)) in _STOPS:
+            problems.warn(
+                inner,
+                "unmarked-stop",
+                f"{name!r} seems to stop the robot, but STOP does not run this command",
+                key=True,
+                hint="write stop: true, or stop: false if this command must not run at STOP",
+            )
 
 
 def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:

@@ -160,12 +160,20 @@ def mapping_hint(document: Document, path: Path, value: object, schema: Mapping[
     """Return a hint with the schema's first example of a mapping; `value` becomes its delimiter."""
     if _is_filled_in(document, path):
         return ""
+    if path[-1] == "reply" and isinstance(value, str) and "equals" in schema.get("properties", ()):
+        is_pattern = value[:1] == "^" or value[-1:] == "$"
+        inner = f"regex: '{value}'" if is_pattern else f"equals: {_quoted(value)}"
+        return f"write a mapping, such as {{ {inner} }}"
     example = next((one for one in schema.get("examples", ()) if isinstance(one, dict)), None)
     if example is None or any(isinstance(one, list) for one in example.values()):
         return ""
     text = value.upper() if isinstance(value, str) else ""
     if {"tx", "rx"} <= example.keys() and text in _DELIMITERS:
         example = {**example, "tx": text, "rx": text}
+    if path[-2:] == ("hold", "release"):
+        return (
+            f"a held command stops with its own values: write a mapping, such as {_flow(example)}"
+        )
     return f"write a mapping, such as {_flow(example)}"
 
 

@@ -19,6 +19,8 @@ _NAME = r'(?:[A-Za-z_][A-Za-z0-9_]*|"[^"\\]+")'
 _PLAIN = re.compile(rf"{_NAME}(?:\.{_NAME}|\[[0-9]{{1,5}}\])*")
 _WHOLE = "@"
 """JMESPath's expression for the whole document."""
+_DOTTED_INDEX = re.compile(r"(?<=[\w\]])\.([0-9]{1,5})(?![\w])")
+"""An index as other programs write it, such as ``.0`` in ``cells.0``."""
 _STEP = re.compile(r'([A-Za-z_][A-Za-z0-9_]*)|"([^"\\]+)"|\[([0-9]+)\]')
 
 
@@ -50,11 +52,13 @@ def _path(part: Node, problems: Problems) -> object:
     try:
         return jmespath.compile(text)
     except JMESPathError as error:
-        offset = getattr(error, "lex_position", None) or 0
+        offset, length = getattr(error, "lex_position", None) or 0, 1
         hint = "paths start without '$', such as battery.level" if text.startswith("$") else ""
-        problems.error(
-            part, "bad-path", f"{text!r} is not a JMESPath expression", offset=offset, hint=hint
-        )
+        if _DOTTED_INDEX.search(text):
+            written = _DOTTED_INDEX.sub(r"[\1]", text)
+            offset, length, hint = 0, len(text), f'an index is in brackets: "{written}"'
+        message = f"{text!r} is not a JMESPath expression"
+        problems.error(part, "bad-path", message, offset=offset, length=length, hint=hint)
     except RecursionError:
         problems.error(part, "bad-path", "the expression is nested too deeply")
     return None
