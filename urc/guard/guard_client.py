@@ -25,11 +25,12 @@ from msgspec.structs import replace
 
 from urc.guard import messages
 from urc.guard.channel import Channel, ChannelListener, GuardedLineSpec
+from urc.guard.goal_reports import GoalReports
 from urc.guard.proxy import GuardedTransport, Stands
 from urc.model.payload import Count, CountedFrame, FrameVariants, Numbered, Payload
 from urc.motion.hold_to_run import HoldTerms, HoldToRun, StopReport
 from urc.problems import UrcError
-from urc.transports.base import GoalRecord
+from urc.transports.base import SupportsGoals
 
 __all__ = ["GuardClient", "HeldSpec"]
 
@@ -106,8 +107,10 @@ class GuardClient:
         self._held = dict(held)
         self._controls: dict[str, _Control] = {}
         """Table of all commands that are armed or may be moving the robot."""
-        self.goals: dict[str, GoalRecord] = {}
-        """Unfinished goals of each transport, as last reported by the guard."""
+        self.goals = GoalReports(
+            [spec.make.line for spec in lines if isinstance(spec.transport, SupportsGoals)]
+        )
+        """The guard's reports about goals."""
         self._stops: deque[tuple[str, StopReport]] = deque(maxlen=_MOST_STOPS)
         self._stopped = asyncio.Event()
 
@@ -253,7 +256,7 @@ class GuardClient:
     def briefing(self) -> Iterator[messages.ToGuard]:
         """Yield the messages that initialise a new guard: pending stops, then armed controls."""
         for spec in self.lines:
-            goals = self.goals.get(spec.make.line)
+            goals = self.goals.record(spec.make.line)
             yield spec.make if goals is None else replace(spec.make, goals=goals)
         for command, control in self._controls.items():
             control.number, control.first = 0, 1
@@ -270,7 +273,7 @@ class GuardClient:
         elif isinstance(message, messages.StopDue):
             self._record_due(message.control)
         elif isinstance(message, messages.GoalsChanged):
-            self.goals[message.line] = message.record
+            self.goals.changed(message.line, message.record)
         elif not isinstance(message, messages.Heartbeat):
             self.transports[message.line].handle(message, size)
             if isinstance(message, messages.LineLost | messages.LineClosed):

@@ -139,10 +139,11 @@ class MotionController:
             if self.is_certain:
                 self.on_change(self.lease.state)
 
-    def owe_unanswered(self) -> None:
-        """Send the unanswered stop commands of a latched STOP again, in a new session."""
+    def owe_unanswered(self, commands: Sequence[str] | None = None) -> None:
+        """Send unanswered stop commands of a latched STOP again; None means all of them."""
         if self.lease.latched:
-            self._unconfirmed |= self._unanswered
+            names = self._unanswered if commands is None else self._unanswered & set(commands)
+            self._unconfirmed |= names
 
     def holds(self, command: str) -> bool:
         """Return whether `command` is a held command."""

@@ -8,8 +8,9 @@ because a command may have waited in a queue or for a confirmation.
 
 import asyncio
 from collections.abc import Callable, Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.driver import Command, Driver
 from urc.model.payload import Envelope, Payload
 from urc.model.role import Role, includes
@@ -62,8 +63,9 @@ class Drivable(MotionSession, Protocol):
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """Return whether the robot owes an answer to the cancellation of an action's goals."""
+    @property
+    def goals(self) -> GoalReports:
+        """What the transports have reported about goals."""
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
@@ -99,6 +101,13 @@ def role_refusal(client: Operator, needed: Role) -> str:
     if includes(client.role, needed):
         return ""
     return WATCHES if needed == "drive" else f"this command needs the role {needed}"
+
+
+class _Cancellation(NamedTuple):
+    """A sent cancellation: its action, and the number of reports before it was sent."""
+
+    action: str
+    since: int
 
 
 class OneShotCommands:
@@ -193,31 +202,48 @@ class OneShotCommands:
 
     async def _give_stops(self, session: Drivable) -> None:
         """Repeat the stop commands until the robot has acknowledged each command."""
-        actions: dict[str, str] = {}
-        while owed := self._controller().owed:
-            async with asyncio.TaskGroup() as group:
-                for command in owed:
-                    group.create_task(self._give_stop(session, command, actions))
-            if self._controller().owed:
-                await self._clock.sleep(AGAIN_S)
-        await self._await_answers(session, actions)
+        asked: dict[str, _Cancellation] = {}
+        while self._controller().owed or asked:
+            while owed := self._controller().owed:
+                async with asyncio.TaskGroup() as group:
+                    for command in owed:
+                        group.create_task(self._give_stop(session, command, asked))
+                if self._controller().owed:
+                    await self._clock.sleep(AGAIN_S)
+            await self._await_answers(session, asked)
 
-    async def _await_answers(self, session: Drivable, actions: dict[str, str]) -> None:
+    async def _await_answers(self, session: Drivable, asked: dict[str, _Cancellation]) -> None:
         """Wait until the robot has answered the cancellations; the transport repeats them.
+
+        Return early if a cancellation has not left URC in time; its command is then owed again.
 
         Args:
             session: the session that has sent the cancellations.
-            actions: action of each stop command that cancels goals, keyed by command.
+            asked: cancellation of each stop command that cancels goals, keyed by command.
         """
-        while actions and self._controller().lease.latched:
-            for command, action in tuple(actions.items()):
-                if not session.owes_answer(self.driver.commands[command].transport, action):
-                    del actions[command]
+        until_s = self._clock.now() + AGAIN_S
+        while asked:
+            if not self._controller().lease.latched:
+                asked.clear()
+                return
+            for command, (action, since) in tuple(asked.items()):
+                line = self.driver.commands[command].transport
+                answer = session.goals.answer(line, action, since)
+                if answer == "answered":
+                    del asked[command]
                     self._controller().answered(command)
+                elif answer == "unsent" and self._clock.now() > until_s:
+                    del asked[command]
+                    self._controller().owe_unanswered((command,))
+            if self._controller().owed:
+                return
             await self._clock.sleep(LOOK_S)
 
-    async def _give_stop(self, session: Drivable, command: str, actions: dict[str, str]) -> None:
+    async def _give_stop(
+        self, session: Drivable, command: str, asked: dict[str, _Cancellation]
+    ) -> None:
         sent: list[Payload] = []
+        since = session.goals.number
         outcome, is_heard = "done", True
         try:
             await session.command(command, {}, on_sent=sent.append)
@@ -231,7 +257,7 @@ class OneShotCommands:
             self._recorder.ran(_STOP, command, {}, outcome, sent[-1])
         last = sent[-1] if sent else None
         if outcome == "done" and isinstance(last, Envelope) and last.verb == "cancel":
-            actions[command] = str(last.attributes.get("action"))
+            asked[command] = _Cancellation(str(last.attributes.get("action")), since)
             self._controller().await_answer(command)
         if is_heard:
             self._controller().given(command)

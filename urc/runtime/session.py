@@ -11,6 +11,7 @@ from random import random as random_share
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.driver import STOPPED, Driver
 from urc.model.payload import Envelope, Payload
 from urc.model.profile import Profile
@@ -129,8 +130,8 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
         """Renderer of held commands' frames."""
-        self._goals: dict[str, GoalRecord] = {}
-        """Unfinished goals of each transport, if there is no backend."""
+        self._goals = GoalReports(())
+        """Reports about goals, if there is no backend."""
         self.backend = self._make_backend(engine, transports, motion)
         """Writer of held-command frames; None if the session cannot hold commands."""
         self._dispatcher = Dispatcher(
@@ -183,9 +184,10 @@ class Session:
             transports = self.backend.transports
         else:
             transports = make_transports(driver, self.settings, table)
-            for name, one in transports.items():
-                if isinstance(one, SupportsGoals):
-                    one.keep_goals(GoalRecord(), partial(self._goals.__setitem__, name))
+            known = {n: one for n, one in transports.items() if isinstance(one, SupportsGoals)}
+            self._goals = GoalReports(known)
+            for name, one in known.items():
+                one.keep_goals(GoalRecord(), partial(self._goals.changed, name))
         links = {
             name: Link(
                 spec,
@@ -337,11 +339,10 @@ class Session:
         """
         self._dispatcher.pull(sequence, what)
 
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """Return whether the robot owes an answer to the cancellation of an action's goals."""
-        goals = self._goals if self.backend is None else self.backend.goals
-        record = goals.get(transport)
-        return record is not None and action in record.owed
+    @property
+    def goals(self) -> GoalReports:
+        """What the transports have reported about goals."""
+        return self._goals if self.backend is None else self.backend.goals
 
     def latch(self, reason: str) -> None:
         """End all running sequences and refuse autonomous motion after a press of STOP.

@@ -8,6 +8,7 @@ from typing import Any, get_args
 
 import yaml
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.driver import Command, Driver, TransportSpec
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.payload import Payload
@@ -134,8 +135,8 @@ class FakeRobot:
         self.pulls: list[tuple[str, Pull]] = []
         """Requests about sequences."""
         self.reconnects = 0
-        self.owes_answers = False
-        """Whether the robot owes answers to cancellations of goals."""
+        self.goals = GoalReports(("wire",))
+        """Reports about goals, made by the test."""
         self.payloads: dict[str, Payload] = {}
         """Sent frame of each command, instead of the command's name."""
         """Number of calls of `reconnect` so far."""
@@ -187,10 +188,6 @@ class FakeRobot:
     def pull(self, sequence: str, what: Pull) -> None:
         """Record the request to pause, step, resume or end a sequence."""
         self.pulls.append((sequence, what))
-
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """Return whether the test has set `owes_answers`."""
-        return self.owes_answers
 
     def latch(self, reason: str) -> None:
         """Record the reason for a latched stop."""

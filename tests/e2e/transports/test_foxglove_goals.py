@@ -4,6 +4,7 @@ import asyncio
 import math
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -231,15 +232,17 @@ async def test_a_refused_cancellation_is_repeated_until_the_robot_ends_the_route
     async with acting(rover) as (action, robot):
         following = await started(action, robot)
         action.refuses = True
+        since = robot.session.goals.number
         await robot.command("stop_route")
         await until(lambda: len(action.cancels) >= 4)
         assert {code for _, code in action.cancels} == {REJECTED}
         assert action.running
-        assert robot.session.owes_answer("ros", "/follow_waypoints")
+        assert robot.session.goals.answer("ros", "/follow_waypoints", since) == "owed"
         action.refuses = False
         with pytest.raises(CommandFailed, match="the action was cancelled"):
             await following
-        await until(lambda: not robot.session.owes_answer("ros", "/follow_waypoints"))
+        answer = partial(robot.session.goals.answer, "ros", "/follow_waypoints", since)
+        await until(lambda: answer() == "answered")
 
 
 async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from tests.unit.runtime.desks import DRIVER
 from urc.access.directory import Identity
+from urc.guard.goal_reports import GoalReports
 from urc.model.role import Role
 from urc.protocol.events import MotionEvent, MotionRefused
 from urc.runtime.audit_entry import AuditEntry
@@ -38,13 +39,10 @@ class Scene:
         self.backend = FakeMotionBackend(self.clock)
         self.on_motion: Callable[[MotionEvent], None] | None = None
         self.hub = Hub({})
+        self.goals = GoalReports(())
         self.told: dict[str, list[dict[str, Any]]] = {}
         self.beats: dict[str, int] = {}
         self._numbers = 0
-
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """No goal is ever sent here."""
-        return False
 
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""

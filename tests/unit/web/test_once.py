@@ -14,7 +14,8 @@ from urc.runtime.motion_controller import MotionController
 from urc.runtime.one_shot_commands import OneShotCommands
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
-from urc.testing.dashboard import dashboard_profile
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.transports.base import GoalRecord
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.page_socket import BrowserClient
 from urc.web.wire.drive import Drive
@@ -181,16 +182,36 @@ async def test_a_stop_that_cancels_goals_is_confirmed_when_the_robot_has_answere
     """The transport repeats the cancellation; the other stop commands do not wait for it."""
     async with scene(commands=FOLD | HALT | ABANDON) as it:
         it.robot.payloads["abandon"] = GOALS
-        it.robot.owes_answers = True
+        it.robot.on_command = lambda name, _: report(it.robot, "/dock") if name != "halt" else {}
         it.line.say({"t": "stop"})
         await it.clock.advance(30)
         assert [name for name, _ in it.robot.commands] == ["halt", "abandon"]
         assert not confirmed(it.line)
         assert it.service.is_at_rest, "nothing is left to be sent"
-        it.robot.owes_answers = False
+        report(it.robot)
         await it.clock.advance(0.2)
         assert confirmed(it.line)
         assert [name for name, _ in it.robot.commands] == ["halt", "abandon"]
+
+
+async def test_a_cancellation_that_never_left_is_sent_again_and_not_confirmed() -> None:
+    """As when the guard ends between the command and its frame; older reports prove nothing."""
+    async with scene(commands=FOLD | ABANDON) as it:
+        it.robot.payloads["abandon"] = GOALS
+        report(it.robot, "/dock")
+        report(it.robot)
+        it.line.say({"t": "stop"})
+        await it.clock.advance(5)
+        assert 3 <= len(it.robot.commands) <= 5
+        assert not confirmed(it.line)
+        it.robot.on_command = lambda name, _: report(it.robot, "/dock")
+        await it.clock.advance(2)
+        it.robot.commands.clear()
+        await it.clock.advance(5)
+        assert it.robot.commands == []
+        report(it.robot)
+        await it.clock.advance(0.2)
+        assert confirmed(it.line)
 
 
 @pytest.mark.parametrize("is_reset", [False, True])
@@ -199,7 +220,7 @@ async def test_an_unanswered_cancellation_is_sent_again_in_the_next_session_of_a
 ) -> None:
     async with scene(commands=FOLD | HALT | ABANDON) as it:
         it.robot.payloads["abandon"] = GOALS
-        it.robot.owes_answers = True
+        it.robot.on_command = lambda name, _: report(it.robot, "/dock") if name != "halt" else {}
         it.line.say({"t": "stop"})
         await it.clock.advance(1)
         if is_reset:
@@ -213,11 +234,17 @@ async def test_an_unanswered_cancellation_is_sent_again_in_the_next_session_of_a
         sent = [name for name, _ in it.robot.commands]
         assert sent == ([] if is_reset else ["abandon"])
         assert not controls.controller.is_certain or is_reset
-        it.robot.owes_answers = False
+        report(it.robot)
         await it.clock.advance(1)
         serving.cancel()
         await settle()
         assert confirmed(it.line) or is_reset
+
+
+def report(robot: FakeRobot, *owed: str) -> dict[str, int]:
+    """Report which actions owe an answer; return the reply of a command."""
+    robot.goals.changed("wire", GoalRecord((), owed))
+    return {}
 
 
 def test_after_a_restart_a_latched_stop_that_cancels_goals_is_not_confirmed() -> None:

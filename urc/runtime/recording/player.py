@@ -14,6 +14,7 @@ from contextlib import asynccontextmanager, suppress
 from itertools import islice
 from typing import Final
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.payload import Payload
 from urc.model.profile import Profile
 from urc.model.values import Reading, Sample, Value
@@ -293,9 +294,10 @@ class PlaybackSession:
     def pull(self, sequence: str, what: Pull) -> None:
         """Do nothing, because a recording does not run sequences."""
 
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """Return False, because a recording cancels nothing."""
-        return False
+    @property
+    def goals(self) -> GoalReports:
+        """Return no reports, because a recording cancels nothing."""
+        return GoalReports(())
 
     def latch(self, reason: str) -> None:
         """Do nothing, because a recording does not move a robot."""

@@ -20,6 +20,7 @@ from contextlib import (
 from dataclasses import dataclass
 from typing import Protocol
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.payload import Payload
 from urc.model.profile import Profile, Setting
 from urc.model.values import Reading, Value
@@ -129,8 +130,9 @@ class SessionLike(MotionSession, Protocol):
     def pull(self, sequence: str, what: Pull) -> None:
         """Pause, step, resume or end a running sequence."""
 
-    def owes_answer(self, transport: str, action: str) -> bool:
-        """Return whether the robot owes an answer to the cancellation of an action's goals."""
+    @property
+    def goals(self) -> GoalReports:
+        """What the transports have reported about goals."""
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
