@@ -1,4 +1,4 @@
-"""What a robot's transports have reported about ROS goals and their cancellations.
+"""The reports of a robot's transports about ROS goals and their cancellations.
 
 A command is complete before its cancellation has left the guard. A report from before the command
 therefore proves nothing, and each answer refers to a number of reports.

@@ -65,7 +65,7 @@ class Drivable(MotionSession, Protocol):
 
     @property
     def goals(self) -> GoalReports:
-        """What the transports have reported about goals."""
+        """The transports' reports about goals."""
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""

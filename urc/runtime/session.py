@@ -130,8 +130,6 @@ class Session:
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
         self.frames: MotionFrames = engine.motions
         """Renderer of held commands' frames."""
-        self._goals = GoalReports(())
-        """Reports about goals, if there is no backend."""
         self.backend = self._make_backend(engine, transports, motion)
         """Writer of held-command frames; None if the session cannot hold commands."""
         self._dispatcher = Dispatcher(
@@ -180,6 +178,7 @@ class Session:
     def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
         driver = self.profile.driver
         transports: Mapping[str, Transport]
+        self._goals = GoalReports(())  # used without a backend
         if self.backend is not None:
             transports = self.backend.transports
         else:
@@ -341,7 +340,7 @@ class Session:
 
     @property
     def goals(self) -> GoalReports:
-        """What the transports have reported about goals."""
+        """The transports' reports about goals."""
         return self._goals if self.backend is None else self.backend.goals
 
     def latch(self, reason: str) -> None:
