@@ -241,6 +241,22 @@ async def test_an_unanswered_cancellation_is_sent_again_in_the_next_session_of_a
         assert confirmed(it.line) or is_reset
 
 
+async def test_a_session_without_pages_stays_open_until_the_robot_has_answered() -> None:
+    """The transport repeats the cancellation only while the session is open."""
+    async with scene(commands=FOLD | ABANDON) as it:
+        it.robot.payloads["abandon"] = GOALS
+        it.robot.on_command = lambda name, _: report(it.robot, "/dock")
+        it.line.say({"t": "stop"})
+        await it.clock.advance(1)
+        it.line.leave()
+        await settle()
+        await it.clock.advance(120)
+        assert it.robot.is_open
+        report(it.robot)
+        await it.clock.advance(1)
+        assert not it.robot.is_open
+
+
 def report(robot: FakeRobot, *owed: str) -> dict[str, int]:
     """Report which actions owe an answer; return the reply of a command."""
     robot.goals.changed("wire", GoalRecord((), owed))

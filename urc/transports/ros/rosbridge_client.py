@@ -237,7 +237,8 @@ class RosClient:
         if not goals and name not in self._told and len(self._told) < KNOWN_TOPICS:
             self._told.add(name)
             text = (
-                f"no unfinished goal of {one_line(name, _NAME_SHOWN)} is known: none is cancelled"
+                f"no unfinished goal of {one_line(name, _NAME_SHOWN)} is known: none is cancelled, "
+                "and a goal of another program goes on"
             )
             self._queue.answer(Envelope(NOTICE, {}, text))
 

@@ -482,12 +482,21 @@ class RobotService:
                 return
 
     async def _until_stopped(self) -> None:
-        """Wait until every stop has reached the robot, for at most `STOP_DUE_S` seconds."""
+        """Wait until every stop has reached the robot, for at most `STOP_DUE_S` seconds.
+
+        A latched STOP also waits for the answers to its cancellations, which the transport repeats.
+        """
         end_s = self.clock.now() + STOP_DUE_S
-        while self.controls.controller.is_stop_due and self.clock.now() < end_s:
+        while self._is_stopping and self.clock.now() < end_s:
             if self._has_clients or self._is_unwanted:
                 return
             await self.clock.sleep(_SELDOM_S)
+
+    @property
+    def _is_stopping(self) -> bool:
+        controller = self.controls.controller
+        awaits_answers = bool(controller.lease.latched) and controller.is_unanswered
+        return controller.is_stop_due or awaits_answers
 
     @property
     def _is_unwanted(self) -> bool:
