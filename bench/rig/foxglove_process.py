@@ -2,7 +2,8 @@
 
 ``python foxglove_process.py foxglove:127.0.0.1:0`` prints the same lines as `robot_process`, for
 one robot. An `Int64` on the topic ``/go`` counts as the line ``M NUMBER``. The program also
-publishes ``/beat`` ten times a second. The program ends when its standard input closes.
+publishes ``/beat`` ten times a second, and ``/a`` to ``/e`` fifty times. The program ends when its
+standard input closes.
 """
 
 import contextlib
@@ -17,6 +18,7 @@ import foxglove
 from foxglove.websocket import Capability, ServerListener
 
 BEAT_S = 0.005
+DATA_S = 0.02
 LATE_S = 0.005
 
 
@@ -57,10 +59,14 @@ def main(place: str) -> None:
     )
     schema = foxglove.Schema(name="std_msgs/msg/Int64", encoding="ros2msg", data=b"int64 data")
     beat = foxglove.Channel("/beat", message_encoding="cdr", schema=schema, context=context)
+    data = [
+        foxglove.Channel(f"/{name}", message_encoding="cdr", schema=schema, context=context)
+        for name in "abcde"
+    ]
     print(f"ready {server.port}", flush=True)
     ended = threading.Event()
     threading.Thread(target=_wait, args=[ended], daemon=True).start()
-    due_s = beats_s = time.monotonic()
+    due_s = beats_s = data_s = time.monotonic()
     while not ended.is_set():
         time.sleep(max(0.0, due_s - time.monotonic()))
         now_s = time.monotonic()
@@ -70,6 +76,10 @@ def main(place: str) -> None:
         if now_s >= beats_s:
             beats_s = now_s + 0.1
             beat.log(b"\0\1\0\0" + struct.pack("<q", time.time_ns()))
+        if now_s >= data_s:
+            data_s = now_s + DATA_S
+            for one in data:
+                one.log(b"\0\1\0\0" + struct.pack("<q", time.time_ns()))
         while not robot.said.empty():
             print(robot.said.get(), flush=True)
     server.stop()

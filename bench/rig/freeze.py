@@ -46,8 +46,12 @@ _WAYS: Final = {
     "rosbridge": ("bridge", _ROS.replace("VIA", "rosbridge"), _ROS_SEND),
     "foxglove": ("foxglove", _ROS.replace("VIA", "foxglove"), _ROS_SEND),
     "zenoh": ("zenoh", "type: zenoh", '{ topic: go, text: "M {{ t }}" }'),
+    "ros_zenoh": ("zenoh", _ROS.replace("VIA", "zenoh"), _ROS_SEND),
 }
 """Address, transport and motion frame, for each kind of server."""
+_THROTTLED: Final = {"a": "100ms", "b": "200ms", "c": "500ms", "d": "1s", "e": "2s"}
+"""Throttle of each topic that the robot publishes at 50 Hz, where URC itself throttles."""
+_THROTTLES: Final = ("foxglove", "ros_zenoh")
 _DOCUMENT: Final = """\
 urc: 1
 kind: robot
@@ -107,9 +111,9 @@ async def freeze(
     """Freeze each of `robot_count` robots `rounds` times, for `lasts_s` seconds each.
 
     If `via` is rosbridge, the robot's program is a substitute for rosbridge. If `via` is foxglove,
-    the program is the SDK's server. If `via` is zenoh, the program is a Zenoh router. With
-    `is_killed`, the program is killed instead, and a new program starts `lasts_s` seconds
-    later.
+    the program is the SDK's server. If `via` is zenoh or ros_zenoh, the program is a Zenoh router.
+    With foxglove and ros_zenoh, the robot also publishes topics that URC throttles. With
+    `is_killed`, the program is killed instead, and a new program starts `lasts_s` seconds later.
     """
     dice = random.Random(seed)  # noqa: S311 - the same moments in every run
     moments = [[0.4 + dice.random() for _ in range(rounds)] for _ in range(robot_count)]
@@ -193,8 +197,21 @@ def _profile(port: int, via: str) -> Profile:
         file = Path(folder, "frozen.yaml")
         _, transport, send = _WAYS[via]
         text = _DOCUMENT.replace("TRANSPORT", transport).replace("SEND", send)
+        if via in _THROTTLES:
+            text += _throttled()
         file.write_text(text.replace("PORT", str(port)), "utf-8")
         return load_profile(file, built_in_catalog())
+
+
+def _throttled() -> str:
+    """Return the signals and messages of the topics that URC throttles."""
+    signals = [f"  {name}: {{}}\n" for name in _THROTTLED]
+    wish = "topic: /{0}, type: std_msgs/Int64, throttle: {1}"
+    messages = [
+        f"  {name}: {{ subscribe: {{ {wish.format(name, wait)} }}, json: {{ {name}: data }} }}\n"
+        for name, wait in _THROTTLED.items()
+    ]
+    return "".join(["signals:\n", *signals, "messages:\n", *messages])
 
 
 async def _one(

@@ -27,6 +27,16 @@ async def test_nothing_old_arrives_after_a_freeze_of_the_router_and_the_stop_is_
         freezes += await freeze(1, robot_count=2, lasts_s=3.0, via="zenoh", seed=5 + len(freezes))
 
 
+@pytest.mark.parametrize("lasts_s", [0.65, 3.0])
+async def test_a_freeze_behind_throttled_ros_topics_ends_the_motion(lasts_s: float) -> None:
+    """Messages that URC holds back go on for up to 2 s, and prove nothing."""
+    freezes: list[Freeze] = []
+    while not judged(freezes, 2):
+        freezes += await freeze(
+            1, robot_count=2, lasts_s=lasts_s, via="ros_zenoh", seed=7 + len(freezes)
+        )
+
+
 async def test_the_stop_is_first_after_the_router_was_killed() -> None:
     deaths: list[Freeze] = []
     while not judged(deaths, 2):
