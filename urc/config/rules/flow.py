@@ -12,7 +12,12 @@ from urc.config.rules.answers import check_answers
 from urc.config.rules.frames import check_frames_apart
 from urc.config.rules.motion import check_motion
 from urc.config.rules.traffic import check_traffic
-from urc.config.rules.unmarked import check_unguarded, check_unmarked, check_unmarked_stop
+from urc.config.rules.unmarked import (
+    check_uncancelled,
+    check_unguarded,
+    check_unmarked,
+    check_unmarked_stop,
+)
 from urc.expressions import digested_settings, split_template
 from urc.model.driver import Driver, Poll, Reply, TransportSpec
 from urc.model.payload import WriteSpec
@@ -47,6 +52,7 @@ def check_flow(part: Node, driver: Driver, secrets: frozenset[str], problems: Pr
     check_traffic(part, driver, problems)
     check_motion(part, driver, problems)
     check_unguarded(part, driver, problems)
+    check_uncancelled(part, driver, problems)
     check_unmarked(part, driver, problems)
     check_unmarked_stop(part, driver, problems)
     check_frames_apart(part, driver, problems)

@@ -1,18 +1,28 @@
 """Finds undeclared motion and stops, and autonomous motion without a stop or a confirmation.
 
+Each goal of a moving command also needs a stop that cancels the goal's own action.
+
 A command may suggest motion by its name, by its arguments' units and names, or by its message type.
 Only whole words match: ``moves_left`` does not match ``move``.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 from urc.config.node import Node, Problems
 from urc.model.driver import Command, Driver
+from urc.model.payload import WriteSpec, each_of
+from urc.model.sequence import SendStep, all_steps
 from urc.model.units import quantity_of
 
-__all__ = ["check_unguarded", "check_unmarked", "check_unmarked_stop", "why_it_moves"]
+__all__ = [
+    "check_uncancelled",
+    "check_unguarded",
+    "check_unmarked",
+    "check_unmarked_stop",
+    "why_it_moves",
+]
 
 
 def _words(text: str) -> frozenset[str]:
@@ -118,6 +128,41 @@ def check_unguarded(part: Node, driver: Driver, problems: Problems) -> None:
                     hint="mark the command that ends the motion with stop: true; if the robot has"
                     " no stop, add 'confirm' to this command",
                 )
+
+
+def check_uncancelled(part: Node, driver: Driver, problems: Problems) -> None:
+    """Warn about each moving command with a goal whose action no stop command cancels."""
+    ended = [
+        found
+        for command in driver.commands.values()
+        if command.stops
+        for found in _actions(command, "cancel")
+    ]
+    for key in ("commands", "sequences"):
+        for name, inner in part.named(key).items():
+            command = driver.commands[name]
+            if not command.moves or all(one in ended for one in _actions(command, "goal")):
+                continue
+            problems.warn(
+                inner,
+                "uncancelled-goal",
+                f"{name!r} sends a goal that moves the robot, but no stop command cancels the"
+                " goal's action: STOP does not end this goal",
+                key=True,
+                hint="add a command with stop: true and a 'cancel' of the same action; if the goal"
+                " moves nothing, write moves: false",
+            )
+
+
+def _actions(command: Command, verb: str) -> Iterator[tuple[str, object]]:
+    """Return the transport and the action of each of a command's frames with this verb."""
+    sends: list[tuple[str, WriteSpec]] = [(command.transport, one) for one in each_of(command.send)]
+    steps = (step for step in all_steps(command.steps) if isinstance(step, SendStep))
+    sends += [(step.transport, one) for step in steps for one in each_of(step.send)]
+    for transport, send in sends:
+        attributes = send.options.get("attributes")
+        if send.options.get("verb") == verb and isinstance(attributes, Mapping):
+            yield transport, attributes.get("action")
 
 
 def _is_asked(command: Command) -> bool:
