@@ -152,6 +152,11 @@ class TopicCodec:
 
     # -- received envelopes
 
+    @staticmethod
+    def is_unencoded_goal(envelope: Envelope) -> bool:
+        """Return whether the transport asks for the binary form of a goal, before sending it."""
+        return envelope.verb == UNENCODED and "goal" in envelope.attributes
+
     def received(self, envelope: Envelope) -> Received:
         """Return the envelope with plain data in place of bytes."""
         try:
