@@ -23,6 +23,9 @@ __all__ = ["PAUSE_AFTER_S", "ImageDemand", "PausableTopics", "pausable_topics"]
 PAUSE_AFTER_S: Final = 2.0
 """Time without viewers before a topic is paused, so that a page can swap two cameras quickly."""
 CHECK_S: Final = 1.0
+MAX_LIVE_S: Final = 10.0
+"""Longest `stale_after` of an image whose topic may be paused, in seconds. An image that stays live
+for longer would look live to the next viewer, although the robot may have sent a newer one."""
 _TRANSPORTS: Final = ("ros",)
 """Transport types that can subscribe and unsubscribe during a connection."""
 _IMAGES: Final = ("image", "point_cloud")
@@ -43,8 +46,9 @@ class PausableTopics(NamedTuple):
 def pausable_topics(driver: Driver, settings: Mapping[str, Value]) -> dict[str, PausableTopics]:
     """Return the topics that may be paused, keyed by transport.
 
-    All readings of such a topic are images without alarm limits. No formula, requirement or reply
-    needs them, and another topic of the transport remains.
+    All readings of such a topic are images without alarm limits, which are live for `MAX_LIVE_S`
+    seconds at most. No formula, requirement or reply needs them, and another topic of the transport
+    remains.
     """
     used = {name for one in driver.signals.values() if one.formula for name in one.formula.names}
     for command in driver.commands.values():
@@ -53,6 +57,7 @@ def pausable_topics(driver: Driver, settings: Mapping[str, Value]) -> dict[str, 
         name
         for name, one in driver.signals.items()
         if one.type in _IMAGES and name not in used and one.limits.is_empty
+        if 0 < one.stale_after_s <= MAX_LIVE_S
     }
     found = {}
     for name, spec in driver.transports.items():

@@ -148,10 +148,12 @@ async def test_a_new_connection_starts_with_all_topics_and_is_paused_again(desk:
     [
         ("json: { front: data }", "json: { front: data, x: size }"),
         ("signals:", 'signals:\n  seen: { type: boolean, value: "front is not none" }'),
+        ("front: { type: image }", "front: { type: image, stale_after: 10m }"),
+        (", stale_after: 3s", ", stale_after: 60s"),
     ],
 )
 def test_a_topic_that_is_needed_otherwise_stays(tmp_path: Path, old: str, new: str) -> None:
-    """It also sets a number, or a formula needs the image."""
+    """It also sets a number, a formula needs the image, or the old image would look live."""
     text = ROVER.replace(old, new)
     found = pausable_topics(driver_of(tmp_path, text), {})
     assert "/front" not in (found["ros"].images if found else {})
