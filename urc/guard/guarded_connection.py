@@ -103,9 +103,8 @@ class GuardedConnection:
             failed=self._stall,
         )
         self._arrivals = ArrivalCheck(transport)
-        self._offer = None
-        if isinstance(transport, SupportsOffer):
-            self._offer = tolerant(transport.offer, False, self._stall)
+        offer = transport.offer if isinstance(transport, SupportsOffer) else None
+        self._offer = None if offer is None else tolerant(offer, False, self._stall)
         self._prompt = transport if isinstance(transport, Prompt) else None
         self._abort = transport.abort if isinstance(transport, SupportsAbort) else None
         self._queue: SendQueue[int] = SendQueue(

@@ -195,12 +195,25 @@ class Connection:
         """Process an envelope whose body may be a binary ROS message."""
         if self.codec is None:
             return self._envelope(envelope, now)
+        if self.codec.is_unencoded_goal(envelope) and (refused := self._refused(envelope, now)):
+            return self._envelope(refused, now)
         found = self.codec.received(envelope)
         if found.fault:
             return [Violation(self.spec.name, "bad-value", found.fault)]
         if found.reply is not None:
             return [Send(self.spec.name, found.reply)]
         return [] if found.envelope is None else self._envelope(found.envelope, now)
+
+    def _refused(self, goal: Envelope, now: float) -> Envelope | None:
+        """Return a refusal of a goal whose command's conditions no longer hold, or None.
+
+        A goal waits up to a second for its services, which is long enough for a change.
+        """
+        number = goal.attributes.get("id")
+        pending = self._pending_replies.numbered(number)
+        why_not = "" if pending is None else pending.exchange.why_not(now)
+        attributes = {"id": number, "ok": False, "reason": why_not}
+        return Envelope("response", attributes) if why_not else None
 
     def _envelope(self, envelope: Envelope, now: float) -> list[LineEvent]:
         """Process a received envelope with plain data."""

@@ -420,20 +420,6 @@ class Conversation(Connection):
         told = self._of_motion(frame, now) if self.held.is_listening(now) else None
         return self.receiver.publish(frame, now) if told is None else told
 
-    def _unpacked(self, envelope: Envelope, now: float) -> list[LineEvent]:
-        """Process an envelope, but encode no goal whose command's conditions no longer hold.
-
-        A goal waits up to a second for its services, which is long enough for a change.
-        """
-        if self.codec is not None and self.codec.is_unencoded_goal(envelope):
-            number = envelope.attributes.get("id")
-            pending = self._pending_replies.numbered(number)
-            why_not = "" if pending is None else pending.exchange.why_not(now)
-            if why_not:
-                attributes = {"id": number, "ok": False, "reason": why_not}
-                return self._envelope(Envelope("response", attributes), now)
-        return super()._unpacked(envelope, now)
-
     def _response(self, envelope: Envelope, frame: Frame, now: float) -> list[LineEvent]:
         attributes = envelope.attributes
         number, reason = attributes.get("id"), ""
