@@ -125,7 +125,7 @@ class Link:
         self._is_overdue = False
         """Whether a reply or other data from the robot is overdue."""
         self.tried = asyncio.Event()
-        """Event that is set after the first attempt, or now if the engine decides when to connect."""
+        """Event that is set after the first attempt; set at once if the engine opens the link."""
         if not self._is_persistent:
             self.tried.set()
         self._report = LinkReport(spec.name, transport.address, hub, clock)
