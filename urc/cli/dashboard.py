@@ -3,7 +3,7 @@
 import asyncio
 import gc
 import time
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -162,7 +162,6 @@ async def _serve(
             profile.name: await _robot_at_start(stack, factory, place, profile, faulty)
             for profile in profiles
         }
-        _warn_of_packages(robots.values())
         if faulty is not None:
             faulty.begin(faults)
             await stack.enter_async_context(_listening(faulty))
@@ -192,11 +191,11 @@ async def _serve(
     return 0
 
 
-def _warn_of_packages(robots: Iterable[Robot]) -> None:
-    """Report robots that no page can open, because an extra is not installed."""
-    for robot in robots:
-        if text := missing_package(robot.profile, robot.settings, built_in_catalog().transports):
-            complain(f"urc: {robot.profile.name} cannot be opened: {text}")
+def _warn_of_package(robot: Robot) -> None:
+    """Report a robot that no page can open, because an extra is not installed."""
+    text = missing_package(robot.profile, robot.settings, built_in_catalog().transports)
+    if text:
+        complain(f"urc: {robot.profile.name} cannot be opened: {text}")
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:
@@ -242,6 +241,7 @@ async def _robot_at_start(
 ) -> Robot:
     """Return a profile's robot; with `faulty`, emulate the robot even before a page opens."""
     robot = _first(factory, profile)
+    _warn_of_package(robot)
     if faulty is None:
         return robot
     emulated_robot = EmulatedRobot(robot.profile, robot.settings)

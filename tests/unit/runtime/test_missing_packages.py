@@ -69,10 +69,10 @@ def test_the_terminal_names_robot_package_and_command(
 ) -> None:
     """Before the address; nothing is said about an extra that is installed."""
     one = robot(tmp_path, kind, where, place, match)
-    dashboard._warn_of_packages([one])
+    dashboard._warn_of_package(one)
     assert capsys.readouterr().err == ""
     remove(monkeypatch, kind)
-    dashboard._warn_of_packages([one])
+    dashboard._warn_of_package(one)
     said = capsys.readouterr().err
     assert said.startswith(f"urc: rover cannot be opened: {kind} needs the package {package}: ")
     assert f"install '{package}" in said
