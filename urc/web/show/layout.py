@@ -56,7 +56,9 @@ _OVER, _WINDOW = "auto", "minmax(0,1fr)"
 _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _GAP = "var(--urc-space-3)"
-"""Space between the rows of a grid."""
+"""Space between the rows of a grid over a background."""
+_PLAIN_GAP = "var(--urc-gap)"
+"""Space between the rows of a plain grid."""
 _MOST_COVERED = 2
 """Maximum number of rows of values over the background on a phone in portrait. More rows would hide
 the middle of the background, for example the robot on a map."""
@@ -340,20 +342,46 @@ def _rules(place: str, grid: Layout, canvas: _Canvas, screen: str) -> Iterator[s
             if screen == SHORT and name in canvas.drawer and not place.endswith(f'{REST}"]'):
                 rules = "display:grid;grid-area:auto"
             yield f'{place} [data-place="{index}"]{{{rules}}}'
+    if not canvas.background and "stick" in canvas.footprints.values():
+        room = _grid_height(grid, canvas, screen)
+        yield f".urc-stage:has(> {place}){{grid-template-rows:auto auto minmax({room},1fr)}}"
     corners = _corners(grid, canvas)
     sides = f"--urc-left:{corners['start']};--urc-right:{corners['end']}"
     yield f".urc-robot:has(> .urc-stage > {place}){{{sides}}}"
 
 
+def _grid_height(grid: Layout, canvas: _Canvas, screen: str) -> str:
+    """Return the minimum height of a plain grid as a CSS value.
+
+    A browser computes the minimum height of a grid as if all its rows were as high as the highest
+    row. With sticks, the height is therefore the sum of the rows' own minimum heights.
+    """
+    if screen == PHONE or not _rows_of("stick", grid, canvas):
+        return "min-content"
+    least = [size[len("minmax(") : size.rindex(",")] for size in _row_sizes(grid, canvas, screen)]
+    gaps = f"{len(least) - 1}*{_PLAIN_GAP}"
+    return "calc(" + " + ".join(("0px" if one == "0" else one for one in (*least, gaps))) + ")"
+
+
 def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
     """Return a grid's row sizes and column sizes as CSS values."""
-    row = _LOW_ROW if screen == SHORT else _USED_ROW
-    column, empty_row, empty_column = _USED_COLUMN, _MARGIN, _MARGIN
+    column, empty_column = _USED_COLUMN, _MARGIN
     if canvas.background:
-        row, empty_row, empty_column = _OVER, _WINDOW, _WINDOW
+        empty_column = _WINDOW
         column = _USED_COLUMN if screen == PHONE else _OVER
-    used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     used_columns = _used((slot.column, slot.column_span) for slot in grid.slots)
+    rows = " ".join(_row_sizes(grid, canvas, screen)) or "none"
+    columns = " ".join(_tracks(grid.columns, used_columns, column, empty_column)) or "none"
+    return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+
+
+def _row_sizes(grid: Layout, canvas: _Canvas, screen: str) -> list[str]:
+    """Return a grid's row sizes as CSS values."""
+    row = _LOW_ROW if screen == SHORT else _USED_ROW
+    empty_row = _MARGIN
+    if canvas.background:
+        row, empty_row = _OVER, _WINDOW
+    used_rows = _used((slot.row, slot.row_span) for slot in grid.slots)
     if canvas.background and screen != PHONE and len(used_rows) == grid.rows:
         used_rows = used_rows - {grid.rows // 2}  # no row is empty, so the middle row grows
     sizes = _tracks(grid.rows, used_rows, row, empty_row)
@@ -367,9 +395,7 @@ def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
         sizes = _around_sticks(grid, canvas, sizes)
     if canvas.background and screen == PHONE:
         sizes = [_GROUND_ROW, *sizes]
-    rows = " ".join(sizes) or "none"
-    columns = " ".join(_tracks(grid.columns, used_columns, column, empty_column)) or "none"
-    return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+    return sizes
 
 
 def _ground(covered: int) -> str:
@@ -435,7 +461,7 @@ def _stick_heights(
         whole = _STICK
         if is_wide and _is_corner(slot, grid, canvas):
             whole += f" - {_BESIDE_STOP}"
-        each = f"({whole} - {slot.row_span - 1}*{_GAP})/{slot.row_span}"
+        each = f"({whole} - {slot.row_span - 1}*{_PLAIN_GAP})/{slot.row_span}"
         for row in range(slot.row, slot.row + slot.row_span):
             heights.setdefault(row, {"3.625rem"}).add(each)
     return [
