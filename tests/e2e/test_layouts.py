@@ -625,13 +625,16 @@ STICKS_IN_SIGHT = """() => {
     if (faces.length === 0) faults.push("no stick is shown");
     for (const face of faces) {
         const { left, top, right, bottom, width, height } = face.getBoundingClientRect();
-        if (face.matches(".joystick-face") && Math.min(width, height) < 143) faults.push(`${width} x ${height} px`);
+        const isSmall = face.matches(".joystick-face") && Math.min(width, height) < 143;
+        if (isSmall) faults.push(`${width} x ${height} px`);
         if (bottom > innerHeight + 1) faults.push(`ends at ${bottom}`);
         const middle = [(left + right) / 2, (top + bottom) / 2];
         for (const [x, y] of [middle, [middle[0], top + 4], [middle[0], bottom - 4],
             [left + 4, middle[1]], [right - 4, middle[1]]]) {
-            const met = document.elementFromPoint(x, y)?.closest(".urc-cell, .urc-controls, .urc-alarm-strip");
-            if (met !== face.closest(".urc-cell")) faults.push(`${met?.className} is over ${x}, ${y}`);
+            const met = document.elementFromPoint(x, y)?.closest(
+                ".urc-cell, .urc-controls, .urc-alarm-strip");
+            if (met === face.closest(".urc-cell")) continue;
+            faults.push(`${met?.className} is over ${x}, ${y}`);
         }
     }
     return faults;

@@ -7,7 +7,7 @@ A row or column without a slot is a margin. The margin keeps its position, at an
 normal size. Phones show no margins. A phone in portrait shows the first available grid of
 ``phone_portrait``, ``portrait`` and ``landscape``. If this grid is ``portrait`` or ``landscape``
 and has more than two columns, the phone stacks the slots in reading order. A phone in landscape
-shows ``phone_landscape``, or else ``landscape``.
+shows ``phone_landscape``, or else the rows of ``landscape`` with sticks, or all its rows.
 
 Over a background, each widget has the size of its footprint and is placed on its slot's side of the
 screen. Empty rows and columns fill the remaining space, where the background is visible. On a phone
@@ -356,11 +356,11 @@ def _grid_height(grid: Layout, canvas: _Canvas, screen: str) -> str:
     A browser computes the minimum height of a grid as if all its rows were as high as the highest
     row. With sticks, the height is therefore the sum of the rows' own minimum heights.
     """
-    if screen == PHONE or not _rows_of("stick", grid, canvas):
+    if not _rows_of("stick", grid, canvas):
         return "min-content"
     least = [size[len("minmax(") : size.rindex(",")] for size in _row_sizes(grid, canvas, screen)]
     gaps = f"{len(least) - 1}*{_PLAIN_GAP}"
-    return "calc(" + " + ".join(("0px" if one == "0" else one for one in (*least, gaps))) + ")"
+    return "calc(" + " + ".join("0px" if one == "0" else one for one in (*least, gaps)) + ")"
 
 
 def _template(grid: Layout, canvas: _Canvas, screen: str) -> str:
@@ -437,7 +437,7 @@ def _over_rows(grid: Layout, canvas: _Canvas, screen: str, sizes: Sequence[str])
 
 
 def _around_sticks(grid: Layout, canvas: _Canvas, sizes: Sequence[str]) -> list[str]:
-    """Return the row sizes of a plain grid: sticks get their height, and the other rows the rest."""
+    """Return the row sizes of a plain grid: sticks get their height first."""
     sticks = _rows_of("stick", grid, canvas)
     others = _used((slot.row, slot.row_span) for slot in grid.slots) - sticks
     if not sticks or len(others) > _MOST_SOFT:
