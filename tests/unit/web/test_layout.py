@@ -418,3 +418,25 @@ def test_what_a_left_handed_layout_has_is_not_in_the_drawer() -> None:
     left = {"phone_landscape": Layout(1, 2, (Slot("c", 0, 0), Slot("b", 0, 1)))}
     interface = crowded(low)._replace(left_handed=left)
     assert drawer_slots(interface, FILLED, FOOTPRINTS) == {"a"}
+
+
+def test_a_phone_in_landscape_shows_the_rows_with_sticks() -> None:
+    """The other rows are on the second page; the stick also takes the empty cell above it."""
+    slots = (Slot("a", 0, 0), Slot("b", 1, 0), Slot("c", 2, 0), Slot("move", 2, 1))
+    feet: dict[str, Footprint] = {"a": "value", "b": "value", "c": "value", "move": "stick"}
+    css = grid_css(Interface("i", layouts={"landscape": Layout(3, 2, slots)}), tuple(feet), feet)
+    base = css.split("@media")[0]
+    assert "grid-area:2/2/4/3;" in rules_of(base, 3)
+    low = css.split("@media (max-height: 29.999rem)")[1]
+    assert rules_of(low, 0) == "display:none"
+    assert "grid-area:1/2/3/3;" in rules_of(low, 3)
+
+
+def test_the_rows_of_a_stick_have_its_height() -> None:
+    """Other rows of a plain grid shrink; a corner counts the height next to STOP."""
+    slots = (Slot("a", 0, 0, 1, 2), Slot("b", 1, 0), Slot("move", 1, 1))
+    feet: dict[str, Footprint] = {"a": "value", "b": "value", "move": "stick"}
+    css = grid_css(Interface("i", layouts={"landscape": Layout(2, 2, slots)}), tuple(feet), feet)
+    rows = css.split("@media")[0].split("grid-template-rows:")[1].split(";")[0]
+    assert rows.startswith("minmax(3.625rem,1fr) minmax(max(")
+    assert "var(--urc-stick-head) - var(--urc-dock)" in rows
