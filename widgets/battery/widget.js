@@ -23,12 +23,14 @@ export default {
     const note = part(el, ".battery-note");
     const shell = el.querySelector(".battery-meter") ? new Shell(ctx) : null;
     const cells = el.querySelector(".battery-cells") ? new Cells(ctx) : null;
+    const large = el.querySelector(".battery-large");
     const current = new Mean(MEAN_S);
 
     return {
       update(readings) {
         const { level, status } = readings;
         if (level) shell?.update(level);
+        else if (large && readings["voltage"]) figure(el, readings["voltage"]);
         const imbalance = cells?.update(readings) ?? "";
         for (const name of ["voltage", "current", "temperature"]) {
           const place = el.querySelector(`.battery-${name}`);
@@ -57,12 +59,10 @@ export default {
 class Shell {
   /** @param {Context} ctx */
   constructor({ el, t }) {
+    this.el = el;
     this.t = t;
     this.meter = part(el, ".battery-meter");
     this.full = part(el, ".battery-level");
-    this.number = el.querySelector(".battery-number");
-    this.digits = el.querySelector(".battery-digits");
-    this.unit = el.querySelector(".battery-unit");
     this.pictures = Object.entries(INSIDE).map(([name, inside]) => ({
       inside,
       isLying: name === "lying",
@@ -80,11 +80,7 @@ class Shell {
     const full = known === null ? 0 : share(known, least, most);
     const symbol = known === null ? "" : (signal.unit ?? "%");
     const text = known === null ? "—" : level.text;
-    if (this.number && this.digits && this.unit) {
-      fit(this.number, "--battery-characters", text.length + UNIT_WIDTH * symbol.length, true);
-      write(this.digits, text);
-      write(this.unit, symbol);
-    }
+    figure(this.el, level, signal.unit ?? "%");
     style(this.full, "--battery-full", full.toFixed(3));
     if (signal !== this.drawn) this.draw(signal, least, most);
     const said = noteOf(level, this.t).replace(/[▲◆] /, "");
@@ -173,6 +169,23 @@ class Cells {
     });
     if (count > 0) this.list.replaceChildren(...this.items);
   }
+}
+
+/**
+ * Write the large number, if the widget has one.
+ *
+ * @param {HTMLElement} el
+ * @param {Reading} reading
+ * @param {string} [unit]
+ */
+function figure(el, reading, unit = reading.unit) {
+  const box = el.querySelector(".battery-number");
+  if (!box) return;
+  const isKnown = number(reading) !== null;
+  const [text, symbol] = isKnown ? [reading.text, unit] : ["—", ""];
+  fit(box, "--battery-characters", text.length + UNIT_WIDTH * symbol.length, true);
+  write(part(box, ".battery-digits"), text);
+  write(part(box, ".battery-unit"), symbol);
 }
 
 /**

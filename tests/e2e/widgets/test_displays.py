@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from playwright.async_api import Page, expect
 
+from tests.e2e.browser import Size
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_attribute, until_text
 from tests.e2e.drawn import PIXELS_OF
@@ -36,6 +37,7 @@ SIGNALS = {
         Signal("turned", "array", items="number", size=4),
         Signal("rssi", "integer", unit="dBm"),
         Signal("cells", "array", items="number", unit="V", precision=2),
+        Signal("volts", unit="V", precision=1, limits=AlarmLimits(low=11)),
         Signal("mode", "string"),
         Signal("report", "object"),
         Signal("seen", "image"),
@@ -65,7 +67,11 @@ def use(widget: str, inputs: dict[str, str], slot: str = "", **options: Any) -> 
 
 @asynccontextmanager
 async def shown(
-    new_page: PageMaker, *uses: WidgetUse, columns: int = 4, **commands: Command
+    new_page: PageMaker,
+    *uses: WidgetUse,
+    columns: int = 4,
+    size: Size = "desktop",
+    **commands: Command,
 ) -> AsyncIterator[tuple[FakeRobot, Page]]:
     """Show widgets on one page, in a grid."""
     profile = dashboard_profile(signals=SIGNALS, uses=uses, commands=commands)
@@ -77,7 +83,7 @@ async def shown(
         profile._replace(interfaces={"default": Interface("default", "", {"landscape": grid})})
     )
     async with running_dashboard(robot) as address:
-        page = await new_page()
+        page = await new_page(size=size)
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         yield robot, page
@@ -95,6 +101,60 @@ async def corners(page: Page, selector: str) -> list[list[float]]:
     js = f"(el) => [...el.points].slice(0, 2).map(({{ x, y }}) => {rounded})"
     found: list[list[float]] = await page.eval_on_selector(selector, js)
     return found
+
+
+SIZE_AND_FIT = """(el) => {
+  const [box, cell] = [el, el.closest("[data-cell]")].map((one) => one.getBoundingClientRect());
+  const [own, facts] = [el, document.querySelector(".battery-facts")]
+    .map((one) => parseFloat(getComputedStyle(one).fontSize));
+  return [own / facts, box.right <= cell.right && box.left >= cell.left];
+}"""
+
+
+@pytest.mark.parametrize("size", ["phone", "desktop"])
+async def test_a_battery_with_only_a_voltage_shows_it_large(
+    new_page: PageMaker, size: Size
+) -> None:
+    """Not as an empty battery with the voltage below."""
+    uses = (
+        use("battery", {"voltage": "volts", "current": "amps"}),
+        use("gauge", {"value": "volts"}),
+    )
+    async with shown(new_page, *uses, columns=2, size=size) as (robot, page):
+        await expect(page.locator(".battery-digits")).to_have_text("—")
+        robot.set_reading("volts", 12.34)
+        robot.set_reading("amps", 1.5)
+        await until_text(page, ".battery-digits", "12.3")
+        await until_text(page, ".battery-unit", "V")
+        await expect(page.locator(".battery-facts")).to_have_text("1.5 A")
+        await expect(
+            page.locator(".battery svg, .battery-level, .battery [role=meter]")
+        ).to_have_count(0)
+        ratio, is_inside = await page.eval_on_selector(".battery-number", SIZE_AND_FIT)
+        assert ratio > 1.4
+        assert is_inside
+        robot.set_reading("volts", 10.5, alarm="low")
+        await until_text(page, ".battery-note", "◆ Low")
+
+
+TEXT_LINES = """(el) => {
+  const range = document.createRange();
+  range.selectNodeContents(el);
+  return new Set([...range.getClientRects()].map(({ top }) => Math.round(top))).size;
+}"""
+
+
+async def test_the_buttons_of_an_alert_do_not_break_within_a_word(new_page: PageMaker) -> None:
+    """In a narrow cell, they are below one another."""
+    uses = (use("alerts", {}), use("gauge", {"value": "amps"}))
+    async with shown(new_page, *uses, columns=2, size="phone") as (robot, page):
+        robot.set_reading("amps", 26.0, alarm="hihi")
+        await expect(page.locator(".alerts-seen")).to_be_visible()
+        cell = await page.locator("[data-cell]").first.bounding_box()
+        assert cell is not None
+        assert 150 < cell["width"] < 330
+        for name in ("seen", "later"):
+            assert await page.eval_on_selector(f".alerts-{name}", TEXT_LINES) == 1
 
 
 async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMaker) -> None:
