@@ -146,13 +146,13 @@ TEXT_LINES = """(el) => {
 
 async def test_the_buttons_of_an_alert_do_not_break_within_a_word(new_page: PageMaker) -> None:
     """In a narrow cell, they are below one another."""
-    uses = (use("alerts", {}), use("gauge", {"value": "amps"}))
-    async with shown(new_page, *uses, columns=2, size="phone") as (robot, page):
+    others = (use("gauge", {"value": "amps"}, f"gauge{place}") for place in range(4))
+    async with shown(new_page, use("alerts", {}), *others, columns=5) as (robot, page):
         robot.set_reading("amps", 26.0, alarm="hihi")
         await expect(page.locator(".alerts-seen")).to_be_visible()
         cell = await page.locator("[data-cell]").first.bounding_box()
         assert cell is not None
-        assert 150 < cell["width"] < 330
+        assert 200 < cell["width"] < 330
         for name in ("seen", "later"):
             assert await page.eval_on_selector(f".alerts-{name}", TEXT_LINES) == 1
 
