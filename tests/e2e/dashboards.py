@@ -120,3 +120,18 @@ async def turned(page: Page, size: tuple[int, int]) -> None:
     await page.evaluate(
         "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     )
+
+
+async def is_on_top(page: Page, selector: str) -> bool:
+    """Return whether a finger on the middle of an element meets it, and nothing above it."""
+    return bool(
+        await page.evaluate(
+            """(selector) => {
+                const el = document.querySelector(selector);
+                const { left, top, width, height } = el.getBoundingClientRect();
+                const met = document.elementFromPoint(left + width / 2, top + height / 2);
+                return el.contains(met);
+            }""",
+            selector,
+        )
+    )

@@ -14,7 +14,6 @@ from tests.e2e.motion.driving import (
     Wire,
     centre,
     commands,
-    drawn,
     driven,
     fingers_on,
     fresh,
@@ -90,7 +89,7 @@ async def test_what_has_no_place_is_in_a_drawer_and_only_on_a_low_screen(
         drawer = page.get_by_role("group", name="More controls")
         await expect(drawer.locator(LIFT)).to_contain_text("Lift")
         await expect(drawer).to_contain_text("Winch")
-        await drawn(page)
+        await page.evaluate("Promise.all(document.getAnimations().map((one) => one.finished))")
         seen = await page.evaluate(SEEN, [DRAWER, STICK, STOP])
         assert seen == {"count": 3, "met": 3, "covered": 0, "isWhole": True}
         for size in (PHONE, TABLET, DESKTOP):

@@ -16,6 +16,7 @@ from tests.e2e.motion.driving import STOP, centre
 from tests.e2e.widgets.test_map import AT, POSE, drag
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Reading, Signal
 from urc.protocol.events import Replied
 from urc.runtime.command_failed import CommandFailed
@@ -26,8 +27,8 @@ pytestmark = pytest.mark.anyio
 SIGNALS = {**POSE, "waypoint": Signal("waypoint", "integer", stale_after_s=60)}
 LISTS = {name: Argument(name, "array") for name in ("xs", "ys", "yaws")}
 COMMANDS = {
-    "follow": Command("follow", "wire", None, LISTS, moves=True),  # type: ignore[arg-type]
-    "end": Command("end", "wire", None, stops=True),  # type: ignore[arg-type]
+    "follow": Command("follow", "wire", WriteSpec("text"), LISTS, moves=True),
+    "end": Command("end", "wire", WriteSpec("text"), stops=True),
 }
 
 
