@@ -64,7 +64,7 @@ async def test_a_signal_with_words_is_chosen_and_switched_by_what_the_robot_says
 
 async def test_numbers_are_chosen_for_a_robot_that_reports_words(new_page: PageMaker) -> None:
     """Their labels are the robot's words; a word that cannot be chosen is shown too."""
-    change = Command("set_mode", {"mode": Argument("mode", "integer")}, payload=WriteSpec("x"))
+    change = Command("set_mode", "wire", WriteSpec("text"), {"mode": Argument("mode", "integer")})
     use = WidgetUse(
         "mode",
         "select",
