@@ -86,7 +86,9 @@ test("a line has the live value, its age, or the last one that the server knew",
   assert.equal(lineOf(whole, store, 0), "Battery: Low, 8 %");
   assert.equal(lineOf(whole, store, 7000), "Battery: Low, 8 % · 7 s old");
   store.setUp(false, 0);
-  assert.equal(lineOf({ ...whole, known: false }, store, 700_000), "Battery: Low, value unknown");
+  assert.equal(lineOf({ ...whole, known: false }, store, 700_000), "Battery: Low, 8 % · 11 min old");
+  const empty = storeOf({ stale_after_s: 3 });
+  assert.equal(lineOf({ ...whole, known: false }, empty, 0), "Battery: Low, value unknown");
   const state = { ...whole, condition: "protective stop", priority: "high" };
   assert.equal(lineOf(state, storeOf({ type: "string" }), 0), "Battery: protective stop");
 });
