@@ -21,6 +21,8 @@ from urc.web.app import DashboardOptions, Robot, build_app, serve
 
 SEND = WriteSpec("text", {})
 LEASE_S = 0.25
+PUSH_S = 3.0
+"""Time for the effect of one push, in seconds."""
 CALM_LEASE_S = 120.0
 """For tests that are not about the lease: no pause of a busy machine ends a gesture. No document
 may have one so long; see `unhurried`."""
@@ -84,7 +86,11 @@ class Wire(FakeRobot):
 
     async def until_moving(self, command: str = "drive") -> None:
         """Wait for motion that is more than nothing."""
-        await until(lambda: any(is_motion(text, command) for text in self.line.texts[-3:]))
+        await until(lambda: self.is_moving(command))
+
+    def is_moving(self, command: str = "drive") -> bool:
+        """Return whether one of the newest frames moves."""
+        return any(is_motion(text, command) for text in self.line.texts[-3:])
 
     async def until_stopped(self, command: str = "drive") -> float:
         """Wait until the newest word about `command` is its stop; return when it was written."""
@@ -167,6 +173,20 @@ async def push(page: Page, selector: str = LEFT, right: float = 0, up: float = 6
     await page.mouse.move(x, y)
     await page.mouse.down()
     await page.mouse.move(x + right, y - up, steps=3)
+
+
+async def push_until(is_driven: Callable[[], bool], page: Page, selector: str = LEFT) -> None:
+    """Push a stick until it drives; push again if a busy machine has ended the gesture."""
+    end_s = asyncio.get_running_loop().time() + WAIT_S
+    while True:
+        await push(page, selector)
+        try:
+            async with asyncio.timeout(PUSH_S):
+                await until(is_driven)
+            return
+        except TimeoutError:
+            assert asyncio.get_running_loop().time() < end_s, "no push drove the robot"
+            await page.mouse.up()
 
 
 async def fire(page: Page, script: str) -> None:

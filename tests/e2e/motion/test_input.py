@@ -29,6 +29,7 @@ from tests.e2e.motion.driving import (
     moved,
     opened,
     push,
+    push_until,
     text_of,
 )
 from tests.e2e.motion.ways import WAYS, start_over
@@ -235,8 +236,7 @@ async def test_a_dialog_stops_within_the_lease_and_nothing_resumes(new_page: Pag
             await dialog.accept()  # type: ignore[attr-defined]  # Playwright's dialog
 
         page.on("dialog", keep)
-        await push(page)
-        await robot.until_moving()
+        await push_until(robot.is_moving, page)
         last = robot.line.ticked_s
         opening = asyncio.create_task(fire(page, "setTimeout(() => alert('?'), 0)"))
         await robot.until_stopped()
@@ -252,8 +252,7 @@ async def test_a_page_that_is_busy_stops_within_the_lease(new_page: PageMaker) -
     """Three seconds of work on the page's thread: no tick, and none of them caught up on."""
     async with driven() as (robot, address), lateness() as late:
         page = await opened(new_page, address)
-        await push(page)
-        await robot.until_moving()
+        await push_until(robot.is_moving, page)
         busy = asyncio.create_task(
             fire(page, "{ const end = performance.now() + 3000; while (performance.now() < end); }")
         )
@@ -264,8 +263,7 @@ async def test_a_page_that_is_busy_stops_within_the_lease(new_page: PageMaker) -
         note = await text_of(page, "[data-cell='0'] .joystick-note").text_content() or ""
         assert note.startswith("◆ "), "it says why nothing moves"
         await page.mouse.up()
-        await push(page)
-        await robot.until_moving()
+        await push_until(robot.is_moving, page)
         await page.mouse.up()
 
 
@@ -313,8 +311,7 @@ async def test_a_renderer_that_stands_still_stops_within_the_lease() -> None:
         page.set_default_timeout(PAGE_TIMEOUT_MS)
         await page.goto(address)
         await page.wait_for_selector("[data-cell='0'] .joystick[data-phase='idle']")
-        await push(page)
-        await robot.until_moving()
+        await push_until(robot.is_moving, page)
         frozen = renderers_of(os.getpid())
         assert frozen
         for process in frozen:

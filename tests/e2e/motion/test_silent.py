@@ -10,14 +10,12 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import WAIT_S, until, until_text
-from tests.e2e.motion.driving import fresh, push
+from tests.e2e.motion.driving import PUSH_S, fresh, push_until
 from tests.e2e.processes import UrcProcess
 
 pytestmark = pytest.mark.anyio
 
 EVERY_S = 0.05
-PUSH_S = 3.0
-"""Time for the effect of one push, in seconds."""
 PROFILE = r"""
 urc: 1
 kind: robot
@@ -38,7 +36,7 @@ widgets:
   stick: { use: joystick, bind: { moved: drive }, options: { axes: x } }
 interfaces: { default: { grid: stick } }
 """
-NOTE = ".joystick-note"
+STICK, NOTE = ".joystick-pad", ".joystick-note"
 
 
 class Cart:
@@ -71,25 +69,11 @@ class Cart:
         return bool(self.said) and self.said[-1] not in (b"drive 0\n", b"drive 0.0\n")
 
 
-async def push_until_driven(page: Page, robot: Cart) -> None:
-    """Push the stick; push again if a busy machine has ended the gesture."""
-    end_s = asyncio.get_running_loop().time() + WAIT_S
-    while True:
-        await push(page, ".joystick-pad")
-        try:
-            async with asyncio.timeout(PUSH_S):
-                await until(robot.is_driven)
-            return
-        except TimeoutError:
-            assert asyncio.get_running_loop().time() < end_s, "no push drove the robot"
-            await page.mouse.up()
-
-
 async def mute_while_driven(page: Page, robot: Cart) -> None:
     """Drive the robot and mute it; do both again if a busy machine has ended the gesture before."""
     end_s = asyncio.get_running_loop().time() + WAIT_S
     while True:
-        await push_until_driven(page, robot)
+        await push_until(robot.is_driven, page, STICK)
         robot.is_mute = True
         await until_text(page, "[data-badge-text]", "Robot silent")
         is_driven = robot.is_driven()
@@ -141,7 +125,7 @@ async def test_a_robot_that_falls_silent_is_told_on_the_badge_and_on_the_stick(
         await until_text(page, "[data-badge-text]", "Live")
         await until_text(page, NOTE, "◆ Lost contact while driving")
         await page.mouse.up()
-        await push_until_driven(page, robot)
+        await push_until(robot.is_driven, page, STICK)
         await page.mouse.up()
 
 
@@ -153,7 +137,7 @@ async def test_a_robot_that_is_lost_is_the_reason_that_the_stick_gives(
         page = await fresh(new_page)
         await page.goto(address)
         await until_text(page, "[data-badge-text]", "Live")
-        await push_until_driven(page, robot)
+        await push_until(robot.is_driven, page, STICK)
         door.close()
         for line in list(robot.lines):
             line.transport.abort()
