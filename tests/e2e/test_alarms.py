@@ -75,7 +75,7 @@ async def test_a_strip_shows_the_worst_alarm_and_is_gone_with_it(new_page: PageM
         robot.set_reading("battery", 15, alarm="low")
         await until_text(page, "[data-alarm-strip] .urc-alarm-line", "Battery: Low, 15 %")
         await until_text(page, "[data-alarm-strip] .urc-alarm-action", "Dock now.")
-        await until_text(page, "[data-alarm-strip] .urc-alarm-more", "+1")
+        await until_text(page, "[data-alarm-strip] .urc-alarm-more", "1 more alarm")
         assert await page.title() == f"▲ 2 · {title}"
         assert await strip.get_attribute("data-priority") == "high"
         assert await strip.get_attribute("data-flash") == "true"
