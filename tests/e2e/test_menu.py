@@ -143,7 +143,7 @@ async def test_a_filter_is_kept_on_the_way_back(new_page: PageMaker) -> None:
     async with running_dashboard(*fleet(8)) as address:
         page = await new_page()
         await page.goto(address)
-        await page.get_by_role("button", name="On 0").click()
+        await page.get_by_role("button", name="Connected 0").click()
         await expect(page.get_by_text("No robot fits.")).to_be_visible()
         await page.reload()
         await expect(page.get_by_text("No robot fits.")).to_be_visible()
