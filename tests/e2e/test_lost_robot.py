@@ -78,7 +78,7 @@ GROUND_CELL = "[data-place='ground']"
 OF_PICTURE = """() => {
   const canvas = document.querySelector(".camera-picture");
   const { visibility, filter } = getComputedStyle(canvas);
-  const hatch = getComputedStyle(canvas.closest(".urc-cell"), "::before").backgroundImage;
+  const hatch = getComputedStyle(canvas.closest(".urc-view"), "::after").backgroundImage;
   return { visibility, filter, hatch, width: canvas.width };
 }"""
 
