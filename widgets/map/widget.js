@@ -8,7 +8,7 @@
 import { DASH, attribute, button, colours, isStill, many, noteOf, number, part, style, svg, write } from "urc/kit";
 import { Aim } from "./aim.js";
 import { Choice } from "./choose.js";
-import { Trail, arrowOf, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
+import { Trail, arrowOf, bearingOf, headingText, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
 import { cornersOf, sizeText } from "./grid_image.js";
 import { Occupancy } from "./occupancy.js";
@@ -47,6 +47,7 @@ class Chart {
     this.options = options;
     this.root = part(el, ".map");
     this.text = part(el, ".map-text");
+    this.heading = part(el, ".map-heading");
     this.note = part(el, ".map-note");
     /** @type {"decimal" | "dms"} */
     this.form = options["format"] === "dms" ? "dms" : "decimal";
@@ -187,8 +188,13 @@ class Chart {
     };
     add("+", this.t("Zoom in"), () => this.map.zoomIn());
     add("−", this.t("Zoom out"), () => this.map.zoomOut());
-    this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    this.follower = add("", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    this.follower.append(icon(FOLLOW));
     if (hasGrids) add("⤢", this.t("Show the whole map"), () => this.fit());
+    this.eraser = add("", this.t("Clear the trail"), () => this.clearTrail());
+    this.eraser.append(icon(ERASE));
+    this.eraser.classList.add("map-eraser");
+    this.eraser.hidden = true;
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a route"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
     this.tools = row;
@@ -244,6 +250,17 @@ class Chart {
     if (place && isFree && this.fittedZoom === -1) this.scale();
     this.grid?.ask();
     this.describe();
+  }
+
+  drawTrail() {
+    const { places } = this.trail;
+    this.layers?.trail.setLatLngs(places);
+    if (this.eraser && this.eraser.hidden !== places.length < 2) this.eraser.hidden = places.length < 2;
+  }
+
+  clearTrail() {
+    this.trail.clear();
+    this.drawTrail();
   }
 
   toggleWay() {
@@ -365,14 +382,17 @@ class Chart {
     if (!place) {
       layers.robot.remove();
       layers.ring.remove();
+      write(this.heading, "");
       this.hasPlace = false;
       return;
     }
     style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
+    const isTold = heading !== null && isLive && !this.isLocal;
+    write(this.heading, isTold ? ` · ${this.t("heading {angle}", { angle: headingText(heading) })}` : "");
     attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
     const look = `${place} ${accuracy} ${isLive}`;
     if (look === this.drawn && this.hasPlace) return; // true for most readings of a robot at rest
-    if (isLive && this.trail.add(place)) layers.trail.setLatLngs(this.trail.places);
+    if (isLive && this.trail.add(place, performance.now())) this.drawTrail();
     if (!this.hasPlace) layers.robot.addTo(map);
     layers.robot.setLatLng(place);
     layers.ring.setLatLng(place).setRadius(accuracy ?? 0);
@@ -428,6 +448,17 @@ class Chart {
       attribute(this.wayButton, "aria-pressed", String(isWay));
     }
   }
+}
+
+/** Drawings of buttons whose characters are too small in most fonts. */
+const FOLLOW = "M12 5a7 7 0 1 0 .01 0M12 2v5M12 17v5M2 12h5M17 12h5";
+const ERASE = "M4 6q6 0 6 6t6 6M14 4l6 6M20 4l-6 6";
+
+/** @param {string} path */
+function icon(path) {
+  const drawing = svg("svg", { class: "map-icon", viewBox: "0 0 24 24", "aria-hidden": "true" });
+  drawing.append(svg("path", { d: path }));
+  return drawing;
 }
 
 /** Maximum number of waypoints with numbers on the map; more numbers would cover each other. */
