@@ -25,7 +25,7 @@ from urc.problems import UrcError
 from urc.runtime.audit import FILE, AuditLog
 from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
-from urc.runtime.missing_packages import missing_package
+from urc.runtime.missing_packages import missing_packages
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.server_recorder import NO_ACTOR, ServerRecorder
 from urc.runtime.session import Motion, Session
@@ -191,10 +191,10 @@ async def _serve(
     return 0
 
 
-def _warn_of_package(robot: Robot) -> None:
+def _warn_of_packages(robot: Robot) -> None:
     """Report a robot that no page can open, because an extra is not installed."""
-    text = missing_package(robot.profile, robot.settings, built_in_catalog().transports)
-    if text:
+    transports = built_in_catalog().transports
+    for text in missing_packages(robot.profile, robot.settings, transports):
         complain(f"urc: {robot.profile.name} cannot be opened: {text}")
 
 
@@ -241,7 +241,7 @@ async def _robot_at_start(
 ) -> Robot:
     """Return a profile's robot; with `faulty`, emulate the robot even before a page opens."""
     robot = _first(factory, profile)
-    _warn_of_package(robot)
+    _warn_of_packages(robot)
     if faulty is None:
         return robot
     emulated_robot = EmulatedRobot(robot.profile, robot.settings)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from urc.cli.arguments import profile_path
 from urc.cli.colours import coloured_problem, is_terminal
 from urc.cli.output import complain, json_text
-from urc.problems import Problem, UrcError, has_errors, to_json
+from urc.problems import Problem, UrcError, has_errors, printable, to_json
 
 if TYPE_CHECKING:
     from urc.cli.progress import Progress
@@ -41,6 +41,8 @@ class _Report:
         """Problems in command-line order, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []
         """Test coverage of each tested profile."""
+        self.notes: list[str] = []
+        """Notes about this computer, which are no problems of the documents."""
         self.looked_at: dict[str, None] = {}
         """Paths of all files that affect the result, including missing files."""
 
@@ -125,6 +127,7 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
     from urc.config.load import WidgetFolder, check
     from urc.runtime.coverage import measure
     from urc.runtime.document_tests import exercise
+    from urc.runtime.missing_packages import missing_packages
     from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped
 
@@ -147,6 +150,9 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
             report.failed += len(outcome.problems)
             report.add(outcome.problems)
             report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
+        if checked.profile is not None:
+            missing = missing_packages(checked.profile, {}, catalog.transports)
+            report.notes += [f"{path} cannot be opened on this computer: {one}" for one in missing]
     return report
 
 
@@ -217,6 +223,8 @@ def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = 
             print(tell(problem), flush=True)
         if arguments.coverage:
             _print_coverage(report)
+        for note in report.notes:
+            complain(printable(note))
         complain(_summary(report))
 
 

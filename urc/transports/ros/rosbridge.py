@@ -38,6 +38,7 @@ from urc.transports.base import (
     TOPICS,
     ConnectFailed,
     GoalRecord,
+    MissingPackage,
     PeerClosed,
     TransportError,
 )
@@ -200,6 +201,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
     Raises:
         TransportError: an option is invalid.
+        MissingPackage: the extra for `compression: cbor` is not installed.
     """
 
     def number(name: str, factor: float = 1) -> int:
@@ -215,7 +217,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
         text = f"ros: compression of {topic} must be none, png or cbor, not {compression!r}"
         raise TransportError(text)
     if compression == "cbor" and find_spec("cbor2") is None:
-        raise TransportError(missing("cbor needs", "cbor2", "cbor"))
+        raise MissingPackage(missing("cbor needs", "cbor2", "cbor"))
     return RosSubscription(
         topic,
         str(attributes.get("type") or ""),
