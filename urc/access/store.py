@@ -221,6 +221,10 @@ class AccessStore:
             "UPDATE principals SET grants = ? WHERE id = ?", grants_to_json(grants), principal
         )
 
+    def set_end(self, principal: str, ends_at: float) -> None:
+        """Set the UTC end of a principal's rights; raise `AccessError` if it is unknown."""
+        self._update("UPDATE principals SET ends_at = ? WHERE id = ?", ends_at, principal)
+
     def remove(self, principal: str) -> None:
         """Remove a principal with its sign-ins, credentials and devices.
 
