@@ -136,7 +136,7 @@ class LogEntry:
     time_s: float
     level: Literal["info", "warning", "error"]
     source: str
-    """Name of the transport or command that caused the entry."""
+    """Cause of the entry, such as ``transport wire``, ``engine`` or ``URC``."""
     text: str
 
 

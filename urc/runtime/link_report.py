@@ -65,6 +65,8 @@ class LinkReport:
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport
+        # A transport's bare name, such as “wire”, looks like a word of the message.
+        self._source = f"transport {transport}"
         self._address = address
         self._hub = hub
         self._clock = clock
@@ -129,7 +131,7 @@ class LinkReport:
         if untold is None:
             return
         more = f" (and {untold} more like it)" if untold else ""
-        self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
+        self._hub.log(LogEntry(self._clock.now(), level, self._source, text + more))
 
     def note(self, entry: Noted) -> None:
         """Add a log entry that a message of the robot contains, within the rate limit."""
@@ -137,7 +139,7 @@ class LinkReport:
         if untold is None:
             return
         more = f" (after {untold} entries that are not shown)" if untold else ""
-        self._hub.log(LogEntry(self._clock.now(), entry.level, self._transport, entry.text + more))
+        self._hub.log(LogEntry(self._clock.now(), entry.level, self._source, entry.text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
         """Record traffic while the hub has traffic readers; requests for topics are left out."""

@@ -442,4 +442,4 @@ class EmulatedConnection:
     def _fault(self, text: str) -> None:
         self.faults += 1
         self.last_fault = text
-        log.info("%s: %s", self._name, text)
+        log.info("transport %s: %s", self._name, text)

@@ -206,4 +206,4 @@ class FakeRobot:
 
     def log(self, text: str) -> None:
         """Add an entry to the log."""
-        self.hub.log(LogEntry(self.clock.now(), "info", "wire", text))
+        self.hub.log(LogEntry(self.clock.now(), "info", "transport wire", text))
