@@ -25,6 +25,7 @@ export default {
     const spoken = new Map();
     let watched = { limited: 1, known: 0 }; // until the page reports it
     let isUp = false;
+    let isRefused = false;
     let isMuted = false;
 
     function look() {
@@ -79,7 +80,7 @@ export default {
     /** Number of signals with limits but without a value. */
     function unknown() {
       const count = watched.limited - watched.known;
-      if (!isUp) return t("no connection to URC");
+      if (!isUp) return isRefused ? t("not connected to the robot") : t("no connection to URC");
       return count > 0 ? t("unknown values: {count} of {all}", { count, all: watched.limited }) : "";
     }
 
@@ -146,6 +147,7 @@ export default {
     });
     follow("links", (news) => {
       isUp = news.isUp;
+      isRefused = news.isRefused ?? false;
       show();
     });
     follow("lease", show); // the lease determines the rights

@@ -278,8 +278,9 @@
  * @property {(module: string) => Promise<void>} style Loads the style sheet of a third-party module.
  *
  * @typedef {object} Topics Data of the topics for `follow`.
- * @property {{isUp: boolean, links: readonly Link[], isReplay?: boolean}} links The robot's transports;
- *   empty while the page has no connection to URC. A playback shows their state in the recording.
+ * @property {{isUp: boolean, isRefused?: boolean, links: readonly Link[], isReplay?: boolean}} links The
+ *   robot's transports; empty while the page has no connection to URC, or URC cannot open the robot
+ *   (isRefused). A playback shows their state in the recording.
  * @property {{lines: readonly LogLine[], missing: number}} log The newest lines, oldest first, and
  *   the number of lines lost on their way to this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease The lease.

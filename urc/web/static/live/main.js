@@ -87,7 +87,8 @@ const themes = new Themes(wake);
 const follows = new PageTopics(
   {
     links: () => {
-      const value = { isUp: store.isUp, links: [...store.links.values()], isReplay: badge.isReplay };
+      const isRefused = socket.refusal !== "";
+      const value = { isUp: store.isUp, isRefused, links: [...store.links.values()], isReplay: badge.isReplay };
       return { look: JSON.stringify(value), value };
     },
     log: () => log.news(),
@@ -185,7 +186,7 @@ function draw() {
   follows.frame();
   askPictures();
   badge.frame(store, socket);
-  panel.frame(store, socket.reason);
+  panel.frame(store, socket.reason, socket.refusal !== "");
   lost.frame(store, socket, nowMs, badge.isReplay);
   alarms.frame(nowMs);
   stop.frame();

@@ -180,21 +180,20 @@ function mistakes(faults) {
 }
 
 /**
- * Show the result of a test at the field that it concerns, the failures first.
+ * Show the results of a test at the fields that they concern; at each field, the failures first.
  *
  * @param {Line[]} some
  */
 function showResults(some) {
   const order = ["fails", "opens", "answers"];
-  const sorted = [...some].sort((one, other) => order.indexOf(one.verdict) - order.indexOf(other.verdict));
-  for (const line of sorted) {
-    const { field: name, verdict } = line;
-    const box = [...form.querySelectorAll("[data-field]")].find(
-      (one) => one instanceof HTMLElement && name !== "" && one.dataset["field"] === name,
-    );
-    const told = box?.querySelector("[data-fault]");
-    if (!box || !(told instanceof HTMLElement) || !told.hidden) continue;
-    told.textContent = resultOf(line, some.length > 1);
+  const sorted = some.toSorted((one, other) => order.indexOf(one.verdict) - order.indexOf(other.verdict));
+  for (const box of form.querySelectorAll("[data-field]")) {
+    const name = box instanceof HTMLElement ? box.dataset["field"] : "";
+    const here = sorted.filter(({ field }) => field !== "" && field === name);
+    const told = box.querySelector("[data-fault]");
+    const verdict = here[0]?.verdict; // the worst
+    if (!verdict || !(told instanceof HTMLElement) || !told.hidden) continue;
+    told.replaceChildren(...here.map((one) => made("span", { class: "urc-result" }, resultOf(one, some.length > 1))));
     told.dataset["tone"] = { answers: "good", opens: "caution" }[String(verdict)] ?? "";
     told.dataset["tested"] = "";
     told.hidden = false;
@@ -209,9 +208,10 @@ function showResults(some) {
  */
 function resultOf({ verdict, transport, cause, address, text }, isNamed) {
   const [sign, word] = VERDICTS[verdict] ?? ["", verdict];
-  if (verdict === "answers") return `${sign} ${isNamed ? `${transport}: ` : ""}${t(word)}`;
+  const name = isNamed ? `${transport}: ` : "";
+  if (verdict === "answers") return `${sign} ${name}${t(word)}`;
   const words = causeWords(cause, address, text);
-  return `${sign} ${words.cause} ${words.step}`;
+  return `${sign} ${name}${words.cause} ${words.step}`;
 }
 
 /** Remove the result of a test from a changed field. @param {Event} event */
