@@ -6,6 +6,8 @@ import { colours, part, style, write } from "urc/kit";
 import { wholes } from "urc/axis_ticks";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
+/** Width of a map with smaller squares, in pixels. */
+const NARROW_PX = 480;
 /** Maximum number of lines; no screen shows this many. */
 const MOST_LINES = 200;
 
@@ -66,7 +68,7 @@ export class Grid {
     this.under?.(pen);
     const [one, other] = [map.containerPointToLatLng([0, height / 2]), map.containerPointToLatLng([100, height / 2])];
     const metres = distance([one.lat, one.lng], [other.lat, other.lng], isLocal) / 100;
-    const step = gridStep(metres);
+    const step = gridStep(metres, width < NARROW_PX ? 40 : 64); // the scale bar leaves room for the place
     write(this.length, distanceText(step));
     style(this.scale, "--map-step", `${(step / metres).toFixed(1)}px`);
     const [up, across] = perMetre(this.origin, isLocal);

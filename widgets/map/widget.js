@@ -290,7 +290,7 @@ class Chart {
       fence,
       holder,
       arrow,
-      trail: line({ weight: 3 }),
+      trail: line({ weight: 4 }),
       way: line({ weight: 3, dashArray: "8 6" }),
       turn: line({ weight: 4 }),
       ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
@@ -452,7 +452,7 @@ class Chart {
 
 /** Drawings of buttons whose characters are too small in most fonts. */
 const FOLLOW = "M12 5a7 7 0 1 0 .01 0M12 2v5M12 17v5M2 12h5M17 12h5";
-const ERASE = "M4 6q6 0 6 6t6 6M14 4l6 6M20 4l-6 6";
+const ERASE = "M4 7h16M9 7V4h6v3M6.5 7l1 13h9l1-13";
 
 /** @param {string} path */
 function icon(path) {

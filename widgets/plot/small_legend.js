@@ -66,5 +66,5 @@ function widthOf(item) {
   const parts = [...(item.firstElementChild?.children ?? [])];
   const widths = parts.map((part) => (part instanceof HTMLElement ? part.offsetWidth : 0));
   const gap = parseFloat(getComputedStyle(item.firstElementChild ?? item).columnGap) || 0;
-  return widths.reduce((sum, width) => sum + width + gap, 0);
+  return widths.reduce((sum, width) => sum + width + gap, -gap);
 }

@@ -90,6 +90,7 @@ function offer() {
   tester.disabled = isBusy;
   tester.textContent = hasChange ? t("Test & save") : t("Test connection");
   tester.classList.toggle("urc-button-main", hasChange);
+  form.querySelector("[data-open]")?.classList.toggle("urc-button-main", !hasChange);
 }
 
 /** @param {boolean} isLocked */
