@@ -73,7 +73,7 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         assert await menu.title() == "▲ 1 · URC"
         await menu.get_by_role("button", name="Alarms 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
-        await menu.get_by_role("button", name="On 1").click()
+        await menu.get_by_role("button", name="Connected 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
         await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
