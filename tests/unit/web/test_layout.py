@@ -294,20 +294,6 @@ def test_only_a_picture_that_is_stacked_asks_for_turning(
     assert needs_turning(page, ("a", "b", "c")) is is_turned
 
 
-def test_the_hint_to_turn_is_for_the_pages_that_need_it() -> None:
-    """Another page of the same interface may be drawn for a phone."""
-    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
-    drawn = Tab(name="two", layouts={"landscape": wide, "phone_portrait": wide})
-    both = Interface("i", tabs={"one": Tab(name="one", layouts={"landscape": wide}), "two": drawn})
-    rules = grid_css(both, ("a", "b", "c"))
-    pages = '.urc-grid[data-page="{0}"],.urc-grid[data-page="{0}-rest"]'
-    hidden = f".urc-stage:has(> :is({pages}))>.urc-turn{{{{display:none}}}}"
-    assert hidden.format(1) in rules
-    assert hidden.format(0) not in rules
-    alone = Interface("i", tabs={"two": drawn})
-    assert "urc-turn" not in grid_css(alone, ("a", "b", "c"))
-
-
 REST = '.urc-grid[data-page="0-rest"]'
 
 

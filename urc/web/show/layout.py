@@ -104,12 +104,9 @@ def grid_css(
     background = interface.background if interface.background in slots else ""
     drawer = drawer_slots(interface, slots, footprints)
     canvas = _Canvas(slots, background, footprints, drawer)
-    turned = [needs_turning(page, slots) for page in interface.pages]
     for number, page in enumerate(interface.pages):
         place = f'.urc-grid[data-page="{number}"]'
         rest = f'.urc-grid[data-page="{number}{REST}"]'
-        if any(turned) and not turned[number]:
-            css += f".urc-stage:has(> :is({place},{rest}))>.urc-turn{{display:none}}"
         right = _placed(page.layouts, canvas)
         left = _left_hand(page, right, canvas)
         css += _both_hands(place, right, left, canvas)
