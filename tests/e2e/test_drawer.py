@@ -85,6 +85,7 @@ async def test_what_has_no_place_is_in_a_drawer_and_only_on_a_low_screen(
         page = await lying(new_page, address)
         await expect(page.locator("[data-rest]")).to_be_hidden()
         await expect(page.locator(LIFT)).to_be_hidden()
+        await expect(page.locator(HANDLE)).to_have_text("Lift, Winch")
         await page.locator(HANDLE).click()
         drawer = page.get_by_role("group", name="More controls")
         await expect(drawer.locator(LIFT)).to_contain_text("Lift")

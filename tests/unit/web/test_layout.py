@@ -242,6 +242,23 @@ def test_next_to_a_stick_only_the_first_row_grows() -> None:
     assert "--urc-down:end" in rules_of(phone, 1)
 
 
+def test_over_a_background_displays_give_way_to_sticks_and_buttons_on_a_low_screen() -> None:
+    """The page scrolls only if all displays are as low as values and the rest is still too high."""
+    slots = (Slot("map", 0, 2), Slot("dock", 1, 0), Slot("move", 1, 2, 2, 1), Slot("low", 2, 0))
+    feet: dict[str, Footprint] = {
+        "map": "view", "dock": "button", "move": "stick", "low": "button"
+    }  # fmt: skip
+    css = over(Layout(3, 3, slots), "map", "dock", "move", "low", **feet)
+    base, phone = css.split("@media")[0], css.split("@media (max-width: 37.499rem)")[1]
+    assert "grid-template-rows:minmax(3.625rem,max-content) " in base
+    room = base.split(">.urc-stage:has(")[0].split("grid-template-rows:auto auto ")[1]
+    assert room.startswith("minmax(max(calc(3.625rem + ")
+    stick = "calc(var(--urc-stick) + var(--urc-stick-head) - var(--urc-dock) + var(--urc-space-3))"
+    assert f"calc(3.625rem + {stick} + 1*var(--urc-gap))" in room
+    assert "grid-template-rows:auto auto minmax(min-content,1fr)" in phone
+    assert "max-content" not in phone.split(LEFT_HAND)[0]
+
+
 def test_views_give_way_to_sticks_on_a_phone_in_landscape() -> None:
     slots = (Slot("map", 0, 2), Slot("move", 1, 2, 2, 1))
     css = over(Layout(3, 3, slots), "map", "move", map="view", move="stick")
