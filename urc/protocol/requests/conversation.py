@@ -27,7 +27,7 @@ from urc.protocol.forms.topics import frame_of
 from urc.protocol.framing.base import FrameFault
 from urc.protocol.framing.delimited import DelimiterDecoder
 from urc.protocol.readings.compiled_value import Taken
-from urc.protocol.requests.connection import Connection
+from urc.protocol.requests.connection import GOAL, Connection
 from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import (
     DONE,
@@ -210,6 +210,8 @@ class Conversation(Connection):
             again = partial(self._count_again, exchange, number)
             shared = CountedFrame(Numbered(data, count), again)
         sent.append(new(Send, (self.spec.name, data, exchange.is_secret, shared)))
+        if isinstance(data, Envelope) and data.verb == GOAL and self.codec is not None:
+            self._await_services(exchange, number)
         if not ask.answers:
             if number is not None:
                 if len(self._askers) >= MOST_IN_FLIGHT:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, NamedTuple, Protocol
 
+from msgspec import structs
+
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Replied
@@ -32,6 +34,7 @@ __all__ = ["COMMAND_TIMEOUT_S", "CommandOutcome", "CommandRunner", "CommandTarge
 
 COMMAND_TIMEOUT_S: Final = 30.0
 """Longest wait for the reply to a command that does not declare a longer one, in seconds."""
+NOT_AWAITED: Final = "the page or program that sent the command no longer waits for its reply"
 
 
 class CommandTarget(Protocol):
@@ -48,6 +51,7 @@ class CommandTarget(Protocol):
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
@@ -94,6 +98,7 @@ class CommandRunner:
         """
         sent: deque[Payload] = deque(maxlen=1)  # the last sent frame
         people: tuple[str, ...] = ()
+        is_over = False
         limit_s = self._limit_s(asked.command) if timeout_s is None else timeout_s
         try:
             people = await self._confirmed(operator, asked)
@@ -103,7 +108,11 @@ class CommandRunner:
                     self._shown_as_motion(asked, target),
                 ):
                     replied = await target.command(
-                        asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
+                        asked.command,
+                        asked.arguments,
+                        confirmed_by=people,
+                        on_sent=sent.append,
+                        unless=self._late_check(operator, asked, lambda: is_over),
                     )
         except asyncio.CancelledError:
             recorder = self._controls.recorder
@@ -118,6 +127,8 @@ class CommandRunner:
             outcome = CommandOutcome(code=failed.code, message=failed.message)
         else:
             outcome = CommandOutcome(replied.values)
+        finally:
+            is_over = True
         self._record(operator, asked, outcome, people, _last(sent))
         return outcome
 
@@ -183,6 +194,36 @@ class CommandRunner:
         if not operator.rights.may_give(asked.command):
             raise CommandRefused("refused", OUT_OF_SCOPE)
         self._controls.once.admit(operator.client, asked.command, asked.arguments, asked.stops)
+
+    def _late_check(
+        self, operator: OperatorSession, asked: CommandRequest, is_over: Callable[[], bool]
+    ) -> Callable[[], str] | None:
+        """Return the check of a command that starts motion at the moment of its sending.
+
+        The command may wait in a queue, and a goal may wait for its services. Meanwhile, the
+        operator may lose the right, another operator may take the lease, or the page may be closed.
+        Other commands are not checked: a command that stops the robot is always sent.
+        """
+        known = self._controls.once.driver.commands.get(asked.command)
+        if known is None or known.stops:
+            return None
+        is_goal = known.send.options.get("verb") == "goal"
+        if not is_goal and not starts_motion(known, asked.arguments):
+            return None
+
+        stops = self._controls.controller.lease.state.stops
+        late = asked if asked.stops is not None else structs.replace(asked, stops=stops)
+
+        def check() -> str:
+            if is_over():
+                return NOT_AWAITED
+            try:
+                self._admit(operator, late)
+            except CommandRefused as refused:
+                return refused.message
+            return ""
+
+        return check
 
     def _record(
         self,

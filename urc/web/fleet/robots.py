@@ -121,6 +121,7 @@ class SessionLike(MotionSession, Protocol):
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
