@@ -15,7 +15,7 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
 from urc.protocol.forms.json_text import filled
-from urc.protocol.forms.topics import listened, published
+from urc.protocol.forms.topics import actions_of, listened, published
 from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.servers.base import (
     SERVERS,
@@ -80,6 +80,7 @@ async def serve(
                 now=now,
                 topics=listened(profile.driver, name, settings),
                 taken={one.topic: one.type for one in published(profile.driver, name, settings)},
+                actions=actions_of(profile.driver, name, settings),
                 is_anywhere=is_anywhere or bool(spec.tunnel),
                 picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
                 last_peer=last_peer,

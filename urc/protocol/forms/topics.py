@@ -13,7 +13,7 @@ from urc.expressions import ExpressionError, Template
 from urc.key_expressions import key_matches
 from urc.model.driver import Driver, Reply
 from urc.model.payload import Envelope, Payload, ReadSpec, each_of
-from urc.model.sequence import ExpectStep, all_steps
+from urc.model.sequence import ExpectStep, SendStep, all_steps
 from urc.model.values import WHOLE_TYPES, Value
 from urc.problems import UrcError
 from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
@@ -23,6 +23,7 @@ __all__ = [
     "PublishedTopic",
     "ReadTopic",
     "TopicReader",
+    "actions_of",
     "frame_of",
     "listened",
     "matches",
@@ -188,6 +189,24 @@ def published(
             found = [_fixed(attributes.get(name), settings) for name in ("topic", "type")]
             if found[0] and found[1] is not None:
                 yield PublishedTopic(command.name, found[0], found[1])
+
+
+def actions_of(driver: Driver, transport: str, settings: Mapping[str, object]) -> tuple[str, ...]:
+    """Return the ROS actions to which a driver's commands send goals or cancellations.
+
+    An action whose name depends on the arguments of a command is left out.
+    """
+    found: dict[str, None] = {}
+    for command in driver.commands.values():
+        sends = [(command.transport, one) for one in each_of(command.send)]
+        steps = (step for step in all_steps(command.steps) if isinstance(step, SendStep))
+        sends += [(step.transport, one) for step in steps for one in each_of(step.send)]
+        for line, spec in sends:
+            if line == transport and spec.options.get("verb") in ("goal", "cancel"):
+                attributes = cast("Mapping[str, object]", spec.options["attributes"])
+                if action := _fixed(attributes.get("action"), settings):
+                    found[action] = None
+    return tuple(found)
 
 
 def _fixed(value: object, settings: Mapping[str, object]) -> str | None:

@@ -8,6 +8,7 @@ the port that worked last.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final, Protocol
 
 from urc.model.payload import Envelope, Payload
@@ -211,7 +212,8 @@ def from_setup(setup: TransportSetup) -> Transport:
         where = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
         wire = _wire(setup, where, offers=via != "rosbridge")
         foxglove = FoxgloveTransport(wire, where, wishes, declared, goals)
-        other = RosbridgeTransport(wire, where, wanted, ros, goals)
+        spare = partial(_wire, setup, where, offers=False)
+        other = RosbridgeTransport(wire, where, wanted, ros, goals, spare)
         if via == "rosbridge":
             return other
         if via == "foxglove":

@@ -45,6 +45,7 @@ from urc.transports.base import (
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph, version_of
 from urc.transports.ros.rosapi_topics import RosapiTopics
+from urc.transports.ros.rosbridge_cancellations import ActionCancellations, CancelWire
 from urc.transports.ros.rosbridge_cells import LARGE_BYTES, packed_operation
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
@@ -80,6 +81,7 @@ class RosbridgeTransport:
         subscriptions: tuple[RosSubscription, ...] = (),
         ros: int | Literal["auto"] | None = None,
         goals: UnfinishedGoals | None = None,
+        spare: Callable[[], CancelWire] | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -90,8 +92,11 @@ class RosbridgeTransport:
             ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
                 bridge's version; None to keep names as written.
             goals: record of unfinished goals that other transports share; None for a new record.
+            spare: function that returns a new transport to the same bridge, for calls that may
+                block a connection; None to make no such calls.
         """
         self._wire = wire
+        self._spare = spare
         self._where = where
         self._subscriptions = subscriptions
         self._ros = ros
@@ -117,7 +122,9 @@ class RosbridgeTransport:
     async def begin(self, timeout_s: float) -> None:
         """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
         packed = frozenset(one.topic for one in self._subscriptions if one.is_packed)
-        session = self._session = _Session(self._wire, self._ros, self._graph, self._goals, packed)
+        session = self._session = _Session(
+            self._wire, self._ros, self._graph, self._goals, packed, self._spare
+        )
         try:
             async with asyncio.timeout(timeout_s):
                 await session.start(self._subscriptions, min(_ANSWER_S, timeout_s * _PART))
@@ -253,6 +260,7 @@ class _Session:
         graph: TopicGraph,
         goals: UnfinishedGoals,
         packed: frozenset[str],
+        spare: Callable[[], CancelWire] | None,
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
@@ -261,6 +269,12 @@ class _Session:
         self._cancelled = asyncio.Event()
         """Event that is set after goals were cancelled."""
         self._canceller: asyncio.Task[None] | None = None
+        self._goals = goals
+        self._told: set[str] = set()
+        self._all: ActionCancellations | None = None
+        if spare is not None and ros != 1:
+            client = self._client
+            self._all = ActionCancellations(spare, client.owes, client.all_cancelled, self._tell)
         self._is_auto = ros == AUTO
         self._frames = OperationReader(packed)
         self._packed = packed
@@ -283,6 +297,8 @@ class _Session:
         self._reader = asyncio.create_task(self._read())
         await self._write(self._client.cancel_due())
         self._canceller = asyncio.create_task(self._cancel_again())
+        for action in self._goals.owed():
+            self._cancel_all(action)
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
@@ -312,9 +328,27 @@ class _Session:
                 self._fresh[topic] = None
             if self._learnt.is_set():
                 frames += self._look_at(topic, str(envelope.attributes.get("type") or ""))
+        action = str(envelope.attributes.get("action"))
+        if envelope.verb == "goal" and self._all is not None:
+            self._all.drop(action)  # it would end the new goal, too
         if envelope.verb == "cancel":
             self._cancelled.set()
-        await self._write(frames)
+        try:
+            await self._write(frames)
+        finally:
+            if envelope.verb == "cancel":
+                self._cancel_all(action)
+
+    def _cancel_all(self, action: str) -> None:
+        """Cancel all goals of an action, also those that URC does not know."""
+        if self._all is not None:
+            self._all.begin(action)
+
+    def _tell(self, text: str) -> None:
+        """Write a line to the robot's log, once per connection."""
+        if text not in self._told and len(self._told) < KNOWN_TOPICS:
+            self._told.add(text)
+            self.queue.answer(Envelope(NOTICE, {}, text))
 
     async def _cancel_again(self) -> None:
         """Repeat the cancellations of goals without results, until cancelled."""
@@ -406,6 +440,8 @@ class _Session:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        if self._all is not None:
+            await self._all.end()
 
     async def _write(self, frames: list[bytes]) -> None:
         for frame in frames:

@@ -23,7 +23,7 @@ from roslibpy.event_emitter import EventEmitterMixin
 from urc.model.payload import Envelope
 from urc.model.values import NOTHING
 from urc.transports._faults import one_line
-from urc.transports.base import NOTICE, TransportError
+from urc.transports.base import TransportError
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
 from urc.transports.ros.types import spelled
@@ -82,8 +82,10 @@ class RosClient:
         """
         self._listened: dict[str, tuple[RosSubscription, _Topic]] = {}
         """Topics that were subscribed on this connection."""
-        self._told: set[str] = set()
-        """Actions for which a `cancel` without a known goal was reported."""
+        self._own: dict[str, None] = {}
+        """Goals of this connection whose results have not arrived, oldest first."""
+        self._all_cancelled: set[str] = set()
+        """Actions of which the robot has answered the cancellation of all goals."""
         self.received: dict[str, int] = {}
         """Number of received messages, keyed by subscribed topic."""
 
@@ -227,6 +229,9 @@ class RosClient:
         )
         self._goals.settle(name)
         self._goals.add(goal, name)
+        while len(self._own) >= MAX_PENDING:
+            del self._own[next(iter(self._own))]
+        self._own[goal] = None
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
         """Cancel all unfinished goals of an action, including those of earlier connections."""
@@ -234,21 +239,49 @@ class RosClient:
         goals = [one for one in self._goals.cancel(name) if not is_ros_id(one)]
         for goal in goals:
             self._cancel_goal(goal, name)
-        if not goals and name not in self._told and len(self._told) < KNOWN_TOPICS:
-            self._told.add(name)
-            text = (
-                f"no unfinished goal of {one_line(name, _NAME_SHOWN)} is known: none is cancelled, "
-                "and a goal of another program goes on"
-            )
-            self._queue.answer(Envelope(NOTICE, {}, text))
+        self._all_cancelled.discard(name)
+
+    def owes(self, action: str) -> bool:
+        """Return whether the robot still owes the cancellation of all goals of an action."""
+        return self._goals.owes(action) and action not in self._all_cancelled
+
+    def all_cancelled(self, action: str, is_cancelling: bool) -> bool:
+        """Note the robot's answer to the cancellation of all goals of an action.
+
+        The answer proves nothing about a goal that the bridge has not passed on yet. The result of
+        each goal of this connection must therefore arrive, too.
+
+        Args:
+            action: name of the action.
+            is_cancelling: whether the robot has listed goals that it now cancels.
+
+        Returns:
+            Whether the answer ends the repetition. rclpy reports a refusal as success without
+            goals. This is no answer while a goal of this connection goes on.
+        """
+        if not is_cancelling and self._is_followed(action):
+            return False
+        self._all_cancelled.add(action)
+        self._settle(action)
+        return True
+
+    def _is_followed(self, action: str) -> bool:
+        """Return whether a cancelled goal of this connection has no result yet."""
+        goals = self._goals.cancelled()
+        return any(name == action and goal in self._own for goal, name in goals)
+
+    def _settle(self, action: str) -> None:
+        """End the cancellation of an action if all its answers have arrived."""
+        if action in self._all_cancelled and not self._is_followed(action):
+            self._all_cancelled.discard(action)
+            self._goals.settle(action)
 
     def _finish(self, goal: str) -> None:
-        """Forget an ended goal; the last cancelled goal of an action answers its cancellation."""
+        """Forget an ended goal, whose result may be the last missing answer."""
         action = self._goals.action(goal)
-        is_cancelled = self._goals.is_cancelled(goal)
+        self._own.pop(goal, None)
         self._goals.finish(goal)
-        if is_cancelled and action not in dict(self._goals.cancelled()).values():
-            self._goals.settle(action)
+        self._settle(action)
 
     def _cancel_goal(self, goal: str, action: str, wait_s: float = FIRST_S) -> None:
         self._repeats[goal] = self._clock() + wait_s, longer(wait_s)
