@@ -388,7 +388,8 @@ class Chart {
     }
     style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
     const isTold = heading !== null && isLive && !this.isLocal;
-    write(this.heading, isTold ? ` · ${this.t("heading {angle}", { angle: headingText(heading) })}` : "");
+    const said = isTold && this.t("heading {angle}", { angle: headingText(heading) });
+    write(this.heading, said ? ` · ${said}` : "");
     attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
     const look = `${place} ${accuracy} ${isLive}`;
     if (look === this.drawn && this.hasPlace) return; // true for most readings of a robot at rest
