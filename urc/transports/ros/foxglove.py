@@ -20,6 +20,7 @@ from typing import Final
 
 from urc.model.payload import Envelope, Payload
 from urc.transports.base import NOTICE, ConnectFailed, GoalRecord, PeerClosed, TransportError
+from urc.transports.ros.foxglove_publishing import PublishedType
 from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession
 from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
@@ -65,7 +66,7 @@ class FoxgloveTransport:
         self._where = where
         self._wishes = wishes
         self._graph = TopicGraph(self._log, ros)
-        self._published: dict[tuple[str, str], str] = {}
+        self._published: dict[tuple[str, str], PublishedType] = {}
         self._goals = UnfinishedGoals() if goals is None else goals
         self._session: FoxgloveSession | None = None
         self._tasks: list[asyncio.Task[None]] = []

@@ -42,6 +42,7 @@ from urc.transports.ros.foxglove_frames import (
     publish_frame,
     service_of,
 )
+from urc.transports.ros.foxglove_publishing import PublishedType, message_data, message_json
 from urc.transports.ros.foxglove_topics import FoxgloveTopics, TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
@@ -66,7 +67,7 @@ MAX_RETRIES: Final = 5
 """Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
-_ENCODINGS: Final = ("cdr", "ros1", "json")
+_ENCODINGS: Final = ("cdr", "ros1", "json", "protobuf")
 PARAMETER: Final = "parameter:"
 """Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 
@@ -98,7 +99,7 @@ class FoxgloveSession:
         *,
         call_at: Callable[[float, Callable[[], None]], object],
         clock: Callable[[], float],
-        published: dict[tuple[str, str], str],
+        published: dict[tuple[str, str], PublishedType],
         goals: UnfinishedGoals | None = None,
         flush: Callable[[], object] = lambda: None,
     ) -> None:
@@ -208,7 +209,7 @@ class FoxgloveSession:
             self._op("subscribeConnectionGraph")
         for (topic, encoding), kind in self._published.items():
             self._announce(topic, encoding, kind)
-            self._graph_topics.announced(topic, kind, ())
+            self._graph_topics.announced(topic, kind.name, ())
         names = [topic[len(PARAMETER) :] for topic in self._wishes if topic.startswith(PARAMETER)]
         if names and "parametersSubscribe" in self.capabilities:
             self._op("subscribeParameterUpdates", parameterNames=names)
@@ -449,27 +450,18 @@ class FoxgloveSession:
             raise TransportError(
                 "the bridge accepts no messages: it lacks the capability clientPublish"
             )
-        encoding, data = str(said.get("encoding") or ""), said.get("data")
-        if not isinstance(data, bytes) or (self.encodings and encoding not in self.encodings):
-            if self.encodings and "json" not in self.encodings:
-                known = ", ".join(self.encodings)
-                raise TransportError(
-                    f"the type {kind} of {topic} is unknown; the bridge accepts {known}"
-                )
-            encoding, data = "json", self._as_json(envelope.body)
-        elif stamps := said.get("stamps"):
-            data = self._time.stamped(data, stamps, time.time_ns())  # type: ignore[arg-type]
+        encoding, data, schema = message_data(envelope, self.encodings, self._time)
         number = self._own.get((topic, encoding))
         if number is None:
             kind = spelled(kind, "msg", 1 if encoding == "ros1" else 2)
-            number = self._announce(topic, encoding, kind)
+            number = self._announce(topic, encoding, PublishedType(kind, schema))
             self._graph_topics.announced(topic, kind, self._channels.values())
             self._graph.learn({one.topic: one.type for one in self._channels.values()})
             if self._graph.publishes(topic, kind) and self.has_graph:
                 self._graph.subscribers(topic, self.listeners(topic) or ())
         self._frames.append((publish_frame(number, data), False))
 
-    def _announce(self, topic: str, encoding: str, kind: str) -> int:
+    def _announce(self, topic: str, encoding: str, kind: PublishedType) -> int:
         while len(self._own) >= KNOWN_TOPICS:
             oldest = next(iter(self._own))
             self._op("unadvertise", channelIds=[self._own.pop(oldest)])
@@ -477,22 +469,11 @@ class FoxgloveSession:
         self._number += 1
         self._own[topic, encoding] = self._number
         self._published[topic, encoding] = kind
-        one = {"id": self._number, "topic": topic, "encoding": encoding, "schemaName": kind}
+        one = {"id": self._number, "topic": topic, "encoding": encoding, "schemaName": kind.name}
+        if kind.schema:
+            one |= {"schema": kind.schema, "schemaEncoding": encoding}
         self._op("advertise", channels=[one])
         return self._number
-
-    def _as_json(self, body: object) -> bytes:
-        seconds, nanos = self._time.now(time.time_ns())
-
-        def timed(value: Any) -> Any:
-            if isinstance(value, Mapping):
-                return {name: timed(inner) for name, inner in value.items()}
-            return {"sec": seconds, "nanosec": nanos} if value == "now" else value
-
-        try:
-            return encode_operation(timed({} if body is None else body))
-        except BadOperation as problem:
-            raise TransportError(str(problem)) from problem
 
     def _call(self, envelope: Envelope) -> None:
         said = envelope.attributes
@@ -507,7 +488,7 @@ class FoxgloveSession:
             self.return_unencoded(service, {"id": number}, envelope.body)
             return
         if encoding == "json":
-            data = self._as_json(envelope.body)
+            data = message_json(envelope.body, self._time)
         if goal := said.get("goal"):
             self._actions.send(str(goal), number, service, data)
             return

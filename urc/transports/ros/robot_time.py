@@ -33,9 +33,23 @@ class RobotTime:
         """Return the robot's time in seconds and nanoseconds; never negative."""
         return divmod(max(here_ns + self._difference_ns, 0), 1_000_000_000)
 
-    def stamped(self, data: bytes, offsets: Iterable[int], here_ns: int) -> bytes:
-        """Return the message `data` with the robot's time written at each offset."""
+    def stamped(
+        self, data: bytes, offsets: Iterable[int], here_ns: int, *, is_protobuf: bool = False
+    ) -> bytes:
+        """Return the message `data` with the robot's time written at each offset.
+
+        In Protocol Buffers, each of the two numbers follows a tag and has five bytes.
+        """
         out, (seconds, nanos) = bytearray(data), self.now(here_ns)
         for offset in offsets:
-            struct.pack_into("<II", out, offset, seconds & 0x7FFFFFFF, nanos)
+            if is_protobuf:
+                out[offset + 1 : offset + 6] = _five(seconds)
+                out[offset + 7 : offset + 12] = _five(nanos)
+            else:
+                struct.pack_into("<II", out, offset, seconds & 0x7FFFFFFF, nanos)
         return bytes(out)
+
+
+def _five(value: int) -> bytes:
+    """Return a number below 2 ** 35 as a varint of five bytes."""
+    return bytes([*(value >> shift & 127 | 128 for shift in (0, 7, 14, 21)), value >> 28 & 127])
