@@ -96,6 +96,7 @@ export class Choice {
     this.bar = document.createElement("div");
     this.bar.className = "map-bar";
     this.bar.setAttribute("role", "group");
+    this.bar.setAttribute("data-taken", "");
     this.bar.setAttribute("aria-label", t("Choose a place"));
     this.words = document.createElement("p");
     this.words.className = "map-words";
