@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "STREAM_KEPT",
+    "TRANSPORT",
     "Hub",
     "LinkState",
     "LinkStatus",
@@ -129,6 +130,11 @@ class LinkStatus:
         return self.state == "connecting" and not self.attempts and not self.is_ready
 
 
+TRANSPORT: Final = "transport "
+"""Start of the source of a transport's log entries: a bare name, such as “wire”, would look like a
+word of the message."""
+
+
 @dataclass(frozen=True, slots=True)
 class LogEntry:
     """A log entry about a fault or a change of state."""
@@ -138,6 +144,11 @@ class LogEntry:
     source: str
     """Cause of the entry, such as ``transport wire``, ``engine`` or ``URC``."""
     text: str
+
+    @property
+    def place(self) -> str:
+        """Cause of the entry, of a transport its name only."""
+        return self.source.removeprefix(TRANSPORT)
 
 
 @dataclass(frozen=True, slots=True)

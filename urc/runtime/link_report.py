@@ -6,7 +6,7 @@ from typing import Literal
 from urc.model.payload import Envelope, Payload, traffic_of
 from urc.protocol.events import Noted, Violation
 from urc.runtime.clock import Clock, Timer
-from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry, Traffic
+from urc.runtime.hub import TRANSPORT, Hub, LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.redaction import REDACTED
 from urc.transports.base import TOPICS
 
@@ -65,8 +65,7 @@ class LinkReport:
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport
-        # A transport's bare name, such as “wire”, looks like a word of the message.
-        self._source = f"transport {transport}"
+        self._source = f"{TRANSPORT}{transport}"
         self._address = address
         self._hub = hub
         self._clock = clock

@@ -49,8 +49,7 @@ async def serve(
         profile: profile with `simulator` rules.
         settings: values for ports and templates; for port 0, the system chooses a free port.
         host: local address to listen on; the default accepts only local clients.
-        now: function that returns the current time, in seconds since the epoch; templates read the
-            time as ``now``.
+        now: function that returns the time in seconds since the epoch, ``now`` in templates.
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
         emulated_robot: emulated robot to serve; None to create one from the profile.
 

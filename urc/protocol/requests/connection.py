@@ -3,7 +3,7 @@
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
 
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload, traffic_of
@@ -27,10 +27,12 @@ from urc.protocol.requests.request_queue import RequestQueue, rendered_size
 if TYPE_CHECKING:
     from urc.protocol.ros.topic_codec import TopicCodec
 
-__all__ = ["GOAL", "Connection"]
+__all__ = ["GOAL", "MOST_IN_FLIGHT", "Connection"]
 
 GOAL: Final = "goal"
 """Verb of an envelope that sends a goal of a ROS action."""
+MOST_IN_FLIGHT: Final = 256
+"""Maximum number of pending replies, including late and real-time replies."""
 MAX_WAITING: Final = 64
 """Maximum number of goals that wait for their services; above it, the oldest is refused."""
 _OVER: Final = "its command has ended, so the goal is not sent"
@@ -213,11 +215,12 @@ class Connection:
             return [Send(self.spec.name, found.reply)]
         return [] if found.envelope is None else self._envelope(found.envelope, now)
 
-    def _await_services(self, exchange: Exchange, number: int | None) -> None:
-        """Keep a goal's request until the transport asks for its binary form."""
-        while len(self._waiting_goals) >= MAX_WAITING:
-            del self._waiting_goals[next(iter(self._waiting_goals))]
-        self._waiting_goals[number] = exchange
+    def _note_sent(self, data: Payload, exchange: Exchange, number: int | None) -> None:
+        """Keep what later frames refer to: goals that wait for services, and numbered requests."""
+        if self.codec is not None and isinstance(data, Envelope) and data.verb == GOAL:
+            _keep(self._waiting_goals, number, exchange, MAX_WAITING)
+        if number is not None and not exchange.ask.answers:
+            _keep(self._askers, number, exchange.owner, MOST_IN_FLIGHT)
 
     def _refused(self, goal: Envelope, now: float) -> Envelope | None:
         """Return a refusal of a goal that must not be sent any more, or None.
@@ -242,6 +245,13 @@ class Connection:
     def _pump(self, now: float) -> list[LineEvent]:
         """Send queued requests if the connection's current state allows it."""
         raise NotImplementedError
+
+
+def _keep(found: dict[object, Any], number: object, item: object, most: int) -> None:
+    """Add an item with a request's number; above `most` items, the oldest is dropped."""
+    while len(found) >= most:
+        del found[next(iter(found))]
+    found[number] = item
 
 
 def _disconnected(lost: list[Exchange], reason: str) -> list[LineEvent]:
