@@ -251,11 +251,11 @@ def test_over_a_background_displays_give_way_to_sticks_and_buttons_on_a_low_scre
     css = over(Layout(3, 3, slots), "map", "dock", "move", "low", **feet)
     base, phone = css.split("@media")[0], css.split("@media (max-width: 37.499rem)")[1]
     assert "grid-template-rows:minmax(3.625rem,max-content) " in base
-    room = base.split(">.urc-stage:has(")[0].split("grid-template-rows:auto auto ")[1]
+    room = base.split(">.urc-stage:has(")[0].split("grid-template-rows:auto ")[1]
     assert room.startswith("minmax(max(calc(3.625rem + ")
     stick = "calc(var(--urc-stick) + var(--urc-stick-head) - var(--urc-dock) + var(--urc-space-3))"
     assert f"calc(3.625rem + {stick} + 1*var(--urc-gap))" in room
-    assert "grid-template-rows:auto auto minmax(min-content,1fr)" in phone
+    assert "grid-template-rows:auto minmax(min-content,1fr)" in phone
     assert "max-content" not in phone.split(LEFT_HAND)[0]
 
 

@@ -308,7 +308,7 @@ def _rules(place: str, grid: Layout, canvas: Canvas, screen: str) -> Iterator[st
             yield f'{place} [data-place="{index}"]{{{rules}}}'
     if canvas.background or "stick" in canvas.footprints.values():
         room = least_height(grid, canvas, screen)
-        yield f".urc-stage:has(> {place}){{grid-template-rows:auto auto minmax({room},1fr)}}"
+        yield f".urc-stage:has(> {place}){{grid-template-rows:auto minmax({room},1fr)}}"
     corners = _corners(grid, canvas)
     sides = f"--urc-left:{corners['start']};--urc-right:{corners['end']}"
     yield f".urc-robot:has(> .urc-stage > {place}){{{sides}}}"
