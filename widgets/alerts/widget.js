@@ -38,7 +38,7 @@ export default {
     /** @param {Alert[]} fresh */
     function spokenOf(fresh) {
       const words = fresh.slice(0, 3).map((alert) => `${alert.title}: ${wordOf(alert).replace(/^[▲◆]\s*/, "")}`);
-      const more = fresh.length > 3 ? [t("+{count} more", { count: fresh.length - 3 })] : [];
+      const more = fresh.length > 3 ? [t("{count} more", { count: fresh.length - 3 })] : [];
       return [...words, ...more].join(". ");
     }
 
@@ -64,7 +64,7 @@ export default {
       const said = alerts.length === 0 ? [calm()] : [
         t("{count} not acknowledged", { count }),
         shelved > 0 ? t("{count} shelved", { count: shelved }) : "",
-        left > 0 ? t("+{count} more", { count: left }) : "",
+        left > 0 ? t("{count} more", { count: left }) : "",
       ];
       const words = [...said, unknown()].filter(Boolean).join(" · ");
       write(note, alerts.length === 0 ? `— ${words}` : words);
