@@ -115,8 +115,12 @@ class AccessStore:
             self._base = sqlite3.connect(
                 self.file, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
             )
-            self._prepare()
-            self._seen = self._version()
+            try:
+                self._prepare()
+                self._seen = self._version()
+            except BaseException:
+                self._base.close()
+                raise
         except (OSError, sqlite3.Error) as error:
             raise AccessError(f"{self.file}: cannot be used: {error}") from None
 

@@ -144,6 +144,8 @@ async def _serve(
         data = robot_options.data
         await _warn_of(data)
         access = access_for(data, is_open=place.is_open)
+        if access.control.store is not None:
+            stack.callback(access.control.store.close)
         access.clock_check = partial(clock_warning, data)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
