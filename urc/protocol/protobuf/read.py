@@ -35,7 +35,7 @@ from urc.protocol.values.transform_tree import MAX_TRANSFORMS
 
 __all__ = ["MAX_DEPTH", "MAX_VALUES", "ProtobufReader", "time_name"]
 
-MAX_VALUES: Final = 1_000_000
+MAX_VALUES: Final = 500_000
 """Maximum number of fields and values in one message, not counting the numbers in packed lists."""
 MAX_DEPTH: Final = 100
 """Maximum depth of nested messages, as in the libraries of Protocol Buffers."""

@@ -20,9 +20,9 @@ its id, in a field of its own. A bridge may also list the fields of the goal aft
 the bytes are the same. Results and feedback are defined in both ways, too. The codec returns their
 inner part, as rosbridge does.
 
-Servers of the Foxglove SDK send Protocol Buffers instead of ROS messages. Their schemas are
-definitions like all others. A type whose name contains a dot, such as ``foxglove.Log``, is written
-by the schema that the robot has sent.
+Servers of the Foxglove SDK send Protocol Buffers or FlatBuffers instead of ROS messages. Their
+schemas are definitions like all others. A type of Protocol Buffers, such as ``foxglove.Log``, is
+written by the schema that the robot has sent.
 
 Services have their own definitions, which the transport delivers with the first call. The transport
 returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
@@ -35,6 +35,8 @@ from typing import Any, Final, NamedTuple, cast
 from urc.model.driver import STOPPED
 from urc.model.payload import Envelope, Payload
 from urc.problems import UrcError, printable
+from urc.protocol.flatbuffer.read import FlatbufferReader
+from urc.protocol.flatbuffer.schema import parse_schema as parse_binary_schema
 from urc.protocol.protobuf.read import ProtobufReader
 from urc.protocol.protobuf.schema import ProtoTypes, parse_schema
 from urc.protocol.protobuf.write import ProtobufWriter
@@ -234,9 +236,11 @@ class TopicCodec:
     def _source(self, schema: _Schema, wanted: Wanted) -> "_AnySource":
         key = (schema, repr(wanted))
         found = self._compiled.get(key)
-        if not isinstance(found, _Source | ProtobufReader):
+        if not isinstance(found, _AnySource):
             if schema.encoding == "protobuf":
                 found = ProtobufReader(self._types(schema), schema.type, wanted)
+            elif schema.encoding == schema.notation == "flatbuffer":
+                found = FlatbufferReader(parse_binary_schema(schema.text), schema.type, wanted)
             else:
                 found = _Source(self._layout(schema), wanted, is_ros1=schema.encoding == "ros1")
             self._keep(key, found)
@@ -260,7 +264,7 @@ class TopicCodec:
         """Return the writer for the requests of a service."""
         key = (schema, "writer")
         found = self._compiled.get(key)
-        if not isinstance(found, Writer | ProtobufWriter):
+        if not isinstance(found, _AnyWriter):
             if schema.encoding == "protobuf":
                 found = ProtobufWriter(self._types(schema), schema.type)
             else:
@@ -420,7 +424,7 @@ class TopicCodec:
         return self._writers[key]
 
 
-_AnySource = _Source | ProtobufReader
+_AnySource = _Source | ProtobufReader | FlatbufferReader
 _AnyWriter = Writer | ProtobufWriter
 _OUTCOMES: Final = {4: "", 5: "the action was cancelled", 6: "the action was aborted"}
 """Outcome of each status of a goal that has ended (action_msgs/msg/GoalStatus)."""

@@ -67,7 +67,7 @@ MAX_RETRIES: Final = 5
 """Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
-_ENCODINGS: Final = ("cdr", "ros1", "json", "protobuf")
+_ENCODINGS: Final = ("cdr", "ros1", "json", "protobuf", "flatbuffer")
 PARAMETER: Final = "parameter:"
 """Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 

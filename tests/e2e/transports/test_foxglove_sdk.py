@@ -1,4 +1,4 @@
-"""Messages in Protocol Buffers, which servers of the Foxglove SDK send by themselves."""
+"""Messages in Protocol Buffers and FlatBuffers, from the server of the Foxglove SDK."""
 
 import asyncio
 import math
@@ -41,6 +41,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3 as GoogleVector
 import urc
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from tests.e2e.transports.ros_bases import picture
+from tests.unit.protocol.flatbuffer import messages as flat
 from tests.unit.protocol.protobuf.messages import schema_of
 from urc.client.local import ConnectedRobot
 from urc.client.stick import MotionEnded
@@ -308,3 +309,45 @@ async def test_a_hostile_schema_costs_one_line(tmp_path: Path, rover: FoxgloveRo
             " (a number has more than ten bytes)",
             "bad-value: /scan: the definition does not contain the type 'foxglove.Any'",
         }
+
+
+async def test_flatbuffers_are_read_by_their_binary_schemas(
+    tmp_path: Path, rover: FoxgloveRobot
+) -> None:
+    """The same signals, with messages that Foxglove's own classes for FlatBuffers have built."""
+    half, jpeg = math.sqrt(0.5), picture()
+    points = b"".join(struct.pack("<fff", x, 0, 1) for x in (1, 2))
+    fields = [(name, 4 * place, 7) for place, name in enumerate("xyz")]
+    pose = flat.pose_in_frame((2.5, 0, 0), (0, 0, half, half), "map", 1_700_000_000, 5)
+    said = {
+        "/pose": ("PoseInFrame", pose),
+        "/scan": ("LaserScan", flat.scan(-1, 1, [1, math.inf, 3])),
+        "/camera": ("CompressedImage", flat.image(jpeg, "jpeg")),
+        "/cloud": ("PointCloud", flat.point_cloud(12, fields, points, "lidar")),
+        "/log": ("Log", flat.log(4, "arm", "hot")),
+    }
+    channels = []
+    for topic, (name, data) in said.items():
+        schema = Schema(
+            name=f"foxglove.{name}", encoding="flatbuffer", data=flat.binary_schema(name)
+        )
+        channel = Channel(
+            topic, message_encoding="flatbuffer", schema=schema, context=rover.context
+        )
+        channels.append((channel, data))
+
+    def publish() -> None:
+        for channel, data in channels:
+            channel.log(data)
+
+    async with connected(tmp_path, rover.port) as robot:
+        names = ("x", "yaw", "step", "picture", "cloud")
+        await until(lambda: all(value(robot, name) is not None for name in names), publish)
+        assert value(robot, "x") == 2.5
+        assert value(robot, "yaw") == pytest.approx(math.pi / 2)
+        assert value(robot, "seconds") == 1_700_000_000
+        assert value(robot, "ranges") == (1, None, 3)
+        assert bytes(value(robot, "picture")) == jpeg
+        found = read_cloud(value(robot, "cloud"))
+        assert (found.frame, struct.unpack("<6f", found.points)) == ("lidar", (1, 0, 1, 2, 0, 1))
+        await until(lambda: "arm: hot" in notes(robot))
