@@ -39,6 +39,7 @@ from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 from urc.web.foxglove.port import FoxglovePort
 from urc.web.people.ways_in import SignInOptions
+from urc.web.serve.access import Access
 from urc.web.serve.clock_check import clock_warning
 from urc.web.serve.service_manager import ServiceManager, answers
 
@@ -129,6 +130,15 @@ def run_dashboard(
     return run_loop(work, code_when_ended=0, is_fast=True)
 
 
+def _opened_access(stack: AsyncExitStack, data: Path, place: DashboardAddress) -> Access:
+    """Return the identities of people, whose store the stack closes."""
+    access = access_for(data, is_open=place.is_open)
+    if access.control.store is not None:
+        stack.callback(access.control.store.close)
+    access.clock_check = partial(clock_warning, data)
+    return access
+
+
 async def _serve(
     profiles: Sequence[Profile],
     place: DashboardAddress,
@@ -143,10 +153,7 @@ async def _serve(
         robot_options = robot_options_of(place, given, faulty)
         data = robot_options.data
         await _warn_of(data)
-        access = access_for(data, is_open=place.is_open)
-        if access.control.store is not None:
-            stack.callback(access.control.store.close)
-        access.clock_check = partial(clock_warning, data)
+        access = _opened_access(stack, data, place)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
         foxglove = FoxglovePort(place.foxglove) if place.foxglove is not None else None
