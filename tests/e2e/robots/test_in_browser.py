@@ -48,6 +48,7 @@ SWIMMERS = ("amphibot-ii", "amphibot-iii", "salamandra-i", "salamandra-ii")
 ORDER = {
     "tello": ["enter", "takeoff", "move", "turn", "fly", "land", "emergency", "takeoff"],
     "create-2": ["start", "full", "dock", "safe"],
+    "spot": ["claim", "power_on", "stand"],
     "ardupilot-rover": ["heartbeat", "set_mode", "arm"],
     "ur-e-series": ["power_on", "brake_release", "load", "play", "pause", "stop"],
     "ur-ros2": [
@@ -57,7 +58,7 @@ ORDER = {
     **{name: ["start", "swim", "steer"] for name in SWIMMERS},
 }
 """What must come before the other commands, which follow as they are declared."""
-LAST = {"ur-e-series": ["power_off"], "ur-ros2": ["power_off"]}
+LAST = {name: ["power_off"] for name in ("spot", "ur-e-series", "ur-ros2")}
 NAVIGATION = {"navigate", "stop_navigation", "place", "follow", "stop_route"}
 """Commands for Nav2, which `tests.e2e.test_navigation` gives on the map."""
 WITHOUT = {
