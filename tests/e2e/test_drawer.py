@@ -21,6 +21,7 @@ from tests.e2e.motion.driving import (
 )
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.values import Signal
+from urc.runtime.running_goals import RunningGoal
 from urc.testing.dashboard import dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -177,10 +178,10 @@ async def test_stop_works_over_an_open_drawer(new_page: PageMaker, how: str) -> 
         if how == "its button":
             await page.locator(STOP).click()
         elif how == "Escape while the robot moves by itself":
-            with robot.hub.moved_by("goal"):  # sent by any screen
-                await asyncio.sleep(0.5)
-                await page.keyboard.press("Escape")
-                await until(lambda: len(robot.latched) == 1)
+            robot.hub.begin_goal(RunningGoal(0, "goal"))  # sent by any screen
+            await asyncio.sleep(0.5)
+            await page.keyboard.press("Escape")
+            await until(lambda: len(robot.latched) == 1)
         else:
             x, y = await centre(page, f"{STICK} >> nth=0")
             await page.mouse.move(x, y)

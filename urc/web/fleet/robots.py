@@ -459,6 +459,7 @@ class RobotService:
                 self._next = None
             self._keep_picture(session.hub)
             self.controls.recorder.attend(None, self.clock.now)
+            await self.commands.end()
             live.ended.set()
             live.fanout.flush()  # wakes every client, so that each sees the end
 
