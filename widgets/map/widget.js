@@ -12,6 +12,7 @@ import { Trail, arrowOf, bearingOf, headingText, isInside, placeOf, placeText, p
 import { Grid } from "./grid.js";
 import { cornersOf, sizeText } from "./grid_image.js";
 import { Occupancy } from "./occupancy.js";
+import { shareGoals } from "./shared_goals.js";
 import { Shapes, metresOf } from "./shapes.js";
 
 /** Inputs of which one is enough for the robot's own map. */
@@ -27,6 +28,7 @@ export default {
     if (ctx.signal.aborted) return {};
     const chart = new Chart(ctx, leaflet);
     ctx.follow("theme", () => chart.theme());
+    ctx.follow("goals", (news) => chart.share(news));
     return {
       update: (readings, outputs) => chart.update(readings, outputs),
       resize: () => chart.resize(),
@@ -57,6 +59,8 @@ class Chart {
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
+    /** Goals of all pages. @type {import("../../urc/web/static/core/types.js").Topics["goals"]} */
+    this.goals = { isKnown: false, goals: [] };
     /** @type {Readonly<Record<string, any>> | undefined} */
     this.readings = undefined;
     /** @type {Place | null} */
@@ -153,7 +157,14 @@ class Chart {
       this.drawChoice();
     });
     if ("goto" in outputs || "waypoints" in outputs || "initial_pose" in outputs) this.listen();
+    shareGoals(this.choice, this.goals);
     if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
+  }
+
+  /** Show the goals of all pages. @param {import("../../urc/web/static/core/types.js").Topics["goals"]} news */
+  share(news) {
+    this.goals = news;
+    if (this.choice) shareGoals(this.choice, news);
   }
 
   listen() {
@@ -416,7 +427,7 @@ class Chart {
   markOf(place, index) {
     const { choice, leaflet, ink } = this;
     const isIn = isInside(place, this.fence);
-    const isRoute = choice !== undefined && choice.mode !== "place" && choice.places.length <= NUMBERED;
+    const isRoute = choice !== undefined && choice.mode !== "place" && !choice.isTrip && choice.places.length <= NUMBERED;
     if (!isRoute) {
       const color = (isIn ? ink?.text : ink?.caution) ?? "";
       return new leaflet.CircleMarker(place, { radius: 9, weight: 3, color, fillOpacity: 0, interactive: false });

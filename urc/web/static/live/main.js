@@ -55,6 +55,9 @@ let session = "";
 
 const address = new URL(root.dataset["socket"] ?? "/ws", location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+const UNKNOWN_GOALS = { look: "", value: { isKnown: false, goals: [] } };
+/** Autonomous motion of all pages; each widget gets that of its own outputs. @type {{look: string, value: any}} */
+let goals = UNKNOWN_GOALS;
 const socket = new Socket(address.href, {
   message: take,
   picture: takePicture,
@@ -63,6 +66,7 @@ const socket = new Socket(address.href, {
     store.setUp(isUp, performance.now());
     if (!isUp) {
       giveUpCommands();
+      goals = UNKNOWN_GOALS; // until the server tells of them again
       drive.lost();
       asks.lost();
       input.spendAll(t("the connection to URC was lost"));
@@ -104,6 +108,7 @@ const follows = new PageTopics(
       return { look: JSON.stringify(value), value };
     },
     sequences: () => ({ look: JSON.stringify(sequences), value: sequences }),
+    goals: () => goals,
     theme: () => themes.news(),
   },
   wake,
@@ -251,6 +256,7 @@ function take(message) {
     case "progress":
       sequences = Object.fromEntries(message.sequences.map((/** @type {import("../core/types.js").Progress} */ one) => [one.command, one]));
       stop.moving = message.moving;
+      goals = sentGoals(message.goals, nowMs);
       break;
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
@@ -291,6 +297,23 @@ function take(message) {
       break;
   }
   wake();
+}
+
+/**
+ * @param {any[]} rows
+ * @param {number} nowMs
+ */
+function sentGoals(rows, nowMs) {
+  const value = rows.map(({ number, command, places, by, page, since, lost = false }) => ({
+    number,
+    command,
+    places,
+    by,
+    isOurs: page === drive.lease?.you,
+    since: (nowMs - since) / 1000,
+    isLost: lost,
+  }));
+  return { look: JSON.stringify(rows.map(({ number, lost }) => [number, lost])), value: { isKnown: true, goals: value } };
 }
 
 /**
