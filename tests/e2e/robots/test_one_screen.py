@@ -22,7 +22,7 @@ ROBOTS = 4
 """Robots in an everyday run."""
 ONE_SCREEN = (Path(__file__).parent / "one_screen.js").read_text("utf-8")
 INTERFACES = "[...document.querySelectorAll('[data-interface-choice] option')].map((o) => o.value)"
-FARTHEST = """() => {
+FREE = """() => {
   const [stop, reset] = ["[data-stop-button]", "[data-verb='reset']"].map(
     (name) => document.querySelector(name).getBoundingClientRect());
   return Math.hypot(
@@ -52,27 +52,27 @@ async def faults_of(page: Page) -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.parametrize("name", sampled(NAMES, ROBOTS, "one screen"))
 async def test_all_cells_and_sticks_are_on_the_screen_and_stop_stands_free(
-    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path, name: str
 ) -> None:
-    """Without scrolling, in each interface of each robot; Reset is far from STOP."""
+    """Without scrolling, in each interface of the robot; Reset is far from STOP."""
     process = urc_process("demo", "--no-browser", "--port", "0", XDG_DATA_HOME=str(tmp_path))
     address = (await process.wait_for_async(r"dashboard (http://\S+)", 60.0))[1]
     page = await new_page()
     await enter(page.context, address)
     wrong = {}
-    for name in sampled(NAMES, ROBOTS, "one screen"):
-        await opened(page, address, name)
-        for interface in await page.evaluate(INTERFACES):
-            await opened(page, address, name, interface)
-            for screen, lines in (await faults_of(page)).items():
-                wrong[f"{name}, {interface}, {screen}"] = lines
-        if not await page.locator("[data-stop-button]").count():
-            continue
+    await opened(page, address, name)
+    for interface in await page.evaluate(INTERFACES):
+        await opened(page, address, name, interface)
+        for screen, lines in (await faults_of(page)).items():
+            wrong[f"{interface}, {screen}"] = lines
+    if await page.locator("[data-stop-button]").count():
         await page.locator("[data-stop-button]").click()
+        await expect(page.locator("[data-verb='reset']")).to_be_visible()
         for size in SCREENS:
             await turned(page, size)
-            free = await page.evaluate(FARTHEST)
+            free = await page.evaluate(FREE)
             if free < LEAST_RESET_PX:
-                wrong[f"{name}, {size}, stopped"] = [f"Reset is {free:.0f} px from STOP"]
+                wrong[f"stopped, {size[0]} x {size[1]}"] = [f"Reset is {free:.0f} px from STOP"]
     assert not wrong, json.dumps(wrong, indent=1, ensure_ascii=False)
