@@ -12,6 +12,8 @@ from functools import partial
 from typing import Final, Protocol
 
 from urc.model.payload import Envelope, Payload
+from urc.ros_names import namespace_fault
+from urc.transports._faults import one_line
 from urc.transports.base import (
     ConnectFailed,
     GoalRecord,
@@ -40,6 +42,7 @@ PORTS: Final[Mapping[str, tuple[int, ...]]] = {
     "auto": (FOXGLOVE_PORT, rosbridge.DEFAULT_PORT),
 }
 """Usual ports for each kind of bridge, in the order in which they are tried."""
+_SHOWN: Final = 60
 _WEBSOCKET: Final = ("auth", "headers")
 """Options that are passed to the WebSocket transport."""
 
@@ -187,6 +190,7 @@ def from_setup(setup: TransportSetup) -> Transport:
     via = options.get("via", "rosbridge")
     if not isinstance(via, str) or via not in PORTS:
         raise TransportError(f"ros: via must be one of {', '.join(PORTS)}, not {via!r}")
+    _check_namespace(options.get("namespace"))
     if via == "zenoh":
         from urc.transports.ros import zenoh  # not needed for the bridges
 
@@ -220,6 +224,17 @@ def from_setup(setup: TransportSetup) -> Transport:
             return foxglove
         candidates.append(Candidate(number, wire, foxglove, other))
     return AnyBridgeTransport(candidates, host if port is None else where, goals)
+
+
+def _check_namespace(given: object) -> None:
+    """Raise `TransportError` if the namespace is invalid; the engine has already applied it."""
+    if given is None:
+        return
+    fault = namespace_fault(given) if isinstance(given, str) else "it must be text"
+    if fault:
+        raise TransportError(
+            f"ros: namespace: {one_line(str(given), _SHOWN)!r} is invalid: {fault}"
+        )
 
 
 def _wire(setup: TransportSetup, where: str, *, offers: bool) -> WebSocketTransport:
