@@ -96,7 +96,7 @@ async def test_traffic_and_notes_come_in_their_order() -> None:
         rows = await it.rows()
         assert [(row["kind"], row["line"], row["data"]) for row in rows] == [
             ("sent", "wire", b"ask\n"),
-            ("note", "transport wire", b""),
+            ("note", "wire", b""),
             ("received", "wire", b"42\n"),
         ]
         assert [row["n"] for row in rows] == [0, 1, 2]
