@@ -24,7 +24,7 @@ sequences until only external events remain.
 from collections.abc import Mapping, Sequence
 
 from urc.model.driver import Command, Driver
-from urc.model.payload import Payload
+from urc.model.payload import RESTARTED, Envelope, Payload
 from urc.model.values import WHOLE_TYPES, Reading, Sample, Value
 from urc.protocol.events import (
     Close,
@@ -208,6 +208,9 @@ class Engine:
         `is_new` is false if the robot has sent nothing since the last call. The transport itself
         has then made the envelope, or has held it back. Such an envelope ends no silence.
         """
+        if isinstance(data, Envelope) and data.verb == RESTARTED:
+            self.readings.forget_stamps()
+            return []
         return self._settle(self.lines[transport].receive(data, now, is_new=is_new), now)
 
     def command(self, request: Request, now: float) -> list[Event]:

@@ -29,7 +29,7 @@ from urc.runtime.registries import built_in_catalog
 from urc.runtime.settings import resolve_settings
 from urc.simulator.server import serve
 
-__all__ = ["BASES", "Base", "STAMPED", "messages", "open_base"]
+__all__ = ["BASES", "Base", "CLOCK", "STAMPED", "messages", "open_base"]
 
 BASES = ("rosbridge", "foxglove", "zenoh")
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -41,6 +41,9 @@ TOPICS = {
     "/map": "nav_msgs/msg/OccupancyGrid",
 }
 START_S = 30.0
+CLOCK = (77, 5)
+"""Seconds and nanoseconds of the base's simulated time, which stands still."""
+_CLOCK = "rosgraph_msgs/msg/Clock"
 EMULATED = """
 urc: 1
 kind: robot
@@ -56,6 +59,7 @@ driver:
       camera: { subscribe: { topic: /camera/image_raw/compressed, type: sensor_msgs/CompressedImage }, json: { picture: data } }
 simulator:
   ros:
+    - { name: clock, every: 100ms, send: { publish: { topic: /clock, type: rosgraph_msgs/Clock, json: { clock: { sec: 77, nanosec: 5 } } } } }
     - { name: camera, every: 500ms, send: { publish: { topic: /camera/image_raw/compressed, json: { format: jpeg, data: JPEG } } } }
 """  # noqa: E501
 
@@ -71,7 +75,7 @@ def messages(prefix: str = "") -> dict[str, tuple[str, bytes]]:
     """Return the type and the CDR bytes of one message of each topic.
 
     With a `prefix` such as ``/robot1``, all topics but the map have it. The transform from map to
-    odom is then a message, too.
+    odom is then a message, too, and the simulated time `CLOCK`.
     """
     random = RandomMessages(ROS2, seed=5)
     made: dict[str, Any] = {topic: random.message(kind) for topic, kind in TOPICS.items()}
@@ -96,7 +100,11 @@ def messages(prefix: str = "") -> dict[str, tuple[str, bytes]]:
     if not prefix:
         return said
     said["/tf"] = (TREE, transform("map", "odom", 10.0))
-    return {topic if topic == "/map" else prefix + topic: one for topic, one in said.items()}
+    time = ROS2.types["builtin_interfaces/msg/Time"](sec=CLOCK[0], nanosec=CLOCK[1])
+    clock = ROS2.types[_CLOCK](clock=time)
+    said["/clock"] = (_CLOCK, bytes(ROS2.serialize_cdr(clock, _CLOCK)))
+    shared = ("/map", "/clock")
+    return {topic if topic in shared else prefix + topic: one for topic, one in said.items()}
 
 
 class Base:
@@ -105,6 +113,8 @@ class Base:
     def __init__(self, line: str, port: int) -> None:
         self.line, self.port = line, port
         self.speeds: list[float] = []
+        self.stamps: list[tuple[int, int]] = []
+        """Time in each command, as seconds and nanoseconds."""
         self.unread = 0
         """Number of commands of another type."""
 
@@ -116,6 +126,8 @@ class Base:
             self.unread += 1
         else:
             self.speeds.append(message.twist.linear.x)
+            stamp = message.header.stamp
+            self.stamps.append((stamp.sec, stamp.nanosec))
 
 
 @asynccontextmanager
@@ -210,6 +222,8 @@ async def _emulated(folder: Path, prefix: str) -> AsyncIterator[Base]:
                 told = json.loads(frame)
                 if told.get("topic") == driven:
                     base.speeds.append(told["msg"]["twist"]["linear"]["x"])
+                    stamp = told["msg"]["header"]["stamp"]
+                    base.stamps.append((stamp["sec"], stamp["nanosec"]))
 
         task = asyncio.create_task(listen())
         try:

@@ -91,6 +91,10 @@ class TransformTree:
         self.links.clear()
         self._searched_s = -math.inf
 
+    def forget_stamps(self) -> None:
+        """Drop all timestamps, after the robot's clock was set; the transforms remain."""
+        self.links = {name: one._replace(stamp_s=None) for name, one in self.links.items()}
+
     def update(self, raw: object, now: float, *, is_static: bool = False) -> list[str]:
         """Store the transforms of a message; return descriptions of rejected transforms.
 

@@ -5,8 +5,7 @@ the message is sent as JSON. No I/O.
 """
 
 import time
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from urc.model.payload import Envelope
 from urc.transports.base import TransportError
@@ -56,14 +55,7 @@ def message_data(
 
 def message_json(body: object, robot: RobotTime) -> bytes:
     """Return a message as JSON text, with the robot's time in place of ``now``."""
-    seconds, nanos = robot.now(time.time_ns())
-
-    def timed(value: Any) -> Any:
-        if isinstance(value, Mapping):
-            return {name: timed(inner) for name, inner in value.items()}
-        return {"sec": seconds, "nanosec": nanos} if value == "now" else value
-
     try:
-        return encode_operation(timed({} if body is None else body))
+        return encode_operation(robot.timed({} if body is None else body, time.time_ns()))
     except BadOperation as problem:
         raise TransportError(str(problem)) from problem

@@ -46,7 +46,7 @@ from urc.transports.ros.foxglove_publishing import PublishedType, message_data, 
 from urc.transports.ros.foxglove_topics import FoxgloveTopics, TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
-from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosapi_answers import RosapiAnswers
 from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
@@ -101,6 +101,7 @@ class FoxgloveSession:
         clock: Callable[[], float],
         published: dict[tuple[str, str], PublishedType],
         goals: UnfinishedGoals | None = None,
+        clock_only: bool | None = None,
         flush: Callable[[], object] = lambda: None,
     ) -> None:
         """Initialise the state for a new connection.
@@ -115,6 +116,8 @@ class FoxgloveSession:
                 persists across connections, so that a new connection announces all these topics
                 immediately.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
+            clock_only: None for the robot's own time. Otherwise, the time is that of the topic
+                ``/clock``, and true means that the driver does not read this topic.
             flush: function that sends the written frames soon.
         """
         self.queue = queue
@@ -143,7 +146,8 @@ class FoxgloveSession:
         self._graph_topics = FoxgloveTopics()
         self._published_s = float("-inf")
         self._number = 0
-        self._time = RobotTime()
+        self._time = RobotTime(is_simulated=clock_only is not None)
+        self._is_clock_only = clock_only is True
         self._told: set[str] = set()
         self._retries: Counter[str] = Counter()
         self._bad = 0
@@ -290,6 +294,12 @@ class FoxgloveSession:
         self._time.told(said.time_ns, time.time_ns())
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
+        if self._time.is_simulated and one.wish.topic == CLOCK_TOPIC:
+            restarted = self._time.clock(one.channel.encoding, said.data)
+            if restarted is not None:
+                self.queue.answer(restarted)
+            if self._is_clock_only:
+                return
         throttle_s = one.wish.throttle_s
         if not throttle_s:
             self.queue.message(one.wish.topic, envelope, len(said.data))

@@ -82,6 +82,7 @@ class RosbridgeTransport:
         ros: int | Literal["auto"] | None = None,
         goals: UnfinishedGoals | None = None,
         spare: Callable[[], CancelWire] | None = None,
+        clock_only: bool | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -94,12 +95,14 @@ class RosbridgeTransport:
             goals: record of unfinished goals that other transports share; None for a new record.
             spare: function that returns a new transport to the same bridge, for calls that may
                 block a connection; None to make no such calls.
+            clock_only: see `RosClient`.
         """
         self._wire = wire
         self._spare = spare
         self._where = where
         self._subscriptions = subscriptions
         self._ros = ros
+        self._clock_only = clock_only
         self._session: _Session | None = None
         self._graph = TopicGraph(self._log, None if ros == AUTO else ros)
         self._goals = UnfinishedGoals() if goals is None else goals
@@ -123,7 +126,13 @@ class RosbridgeTransport:
         """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
         packed = frozenset(one.topic for one in self._subscriptions if one.is_packed)
         session = self._session = _Session(
-            self._wire, self._ros, self._graph, self._goals, packed, self._spare
+            self._wire,
+            self._ros,
+            self._graph,
+            self._goals,
+            packed,
+            self._spare,
+            self._clock_only,
         )
         try:
             async with asyncio.timeout(timeout_s):
@@ -261,11 +270,13 @@ class _Session:
         goals: UnfinishedGoals,
         packed: frozenset[str],
         spare: Callable[[], CancelWire] | None,
+        clock_only: bool | None,
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
         clock = asyncio.get_running_loop().time
-        self._client = RosClient(self.queue, None if ros == AUTO else ros, goals, clock)
+        version = None if ros == AUTO else ros
+        self._client = RosClient(self.queue, version, goals, clock, clock_only)
         self._cancelled = asyncio.Event()
         """Event that is set after goals were cancelled."""
         self._canceller: asyncio.Task[None] | None = None

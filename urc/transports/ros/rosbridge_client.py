@@ -25,6 +25,7 @@ from urc.model.values import NOTHING
 from urc.transports._faults import one_line
 from urc.transports.base import TransportError
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
+from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -59,6 +60,7 @@ class RosClient:
         ros: int | None,
         goals: UnfinishedGoals | None = None,
         clock: Callable[[], float] = time.monotonic,
+        clock_only: bool | None = None,
     ) -> None:
         """Initialise the state for a new connection.
 
@@ -67,7 +69,11 @@ class RosClient:
             ros: ROS version of type names; None keeps names as written.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
             clock: monotonic clock, in seconds.
+            clock_only: None if the bridge replaces ``now`` by its own time. Otherwise, the time is
+                that of the topic ``/clock``, and true means that the driver does not read it.
         """
+        self._time = RobotTime(is_simulated=clock_only is not None)
+        self._is_clock_only = clock_only is True
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -184,6 +190,8 @@ class RosClient:
 
     def _publish(self, attributes: Mapping[str, object], body: object) -> None:
         name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
+        if self._time.is_simulated:
+            body = self._time.timed(body, time.time_ns())
         if not kind:  # the bridge can find the type if another client uses the topic
             operation = {"op": "publish", "topic": name, "msg": _fields(body)}
             self._protocol.send_ros_message(Message(operation))
@@ -301,6 +309,12 @@ class RosClient:
     def _message(self, topic: str, body: object) -> None:
         envelope = Envelope("message", {"topic": topic}, body)
         self.received[topic] += 1
+        if self._time.is_simulated and topic == CLOCK_TOPIC:
+            restarted = self._time.clock(None, body)
+            if restarted is not None:
+                self._queue.answer(restarted)
+            if self._is_clock_only:
+                return
         self._queue.message(topic, envelope, self._size_bytes)
 
     def _answer(self, number: object, is_ok: bool, values: object) -> None:
