@@ -174,6 +174,8 @@ async def test_motion_that_waits_is_not_started_once_its_sender_may_only_watch()
         assert robot.why_not() == ""
         rights.now = "watch"
         assert robot.why_not() == "this page only watches"
+        roles = [operator.client.role for operator in service.controls.operators]
+        assert roles == ["drive"] * 3, "the engine asks, so nothing may happen meanwhile"
         line.leave()
         await settle()
         await serving

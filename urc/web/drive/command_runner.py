@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Final, NamedTuple, Protocol
 
-from msgspec import structs
-
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Replied
@@ -204,7 +202,7 @@ class CommandRunner:
         unless: Callable[[], str] | None,
     ) -> Replied | CommandFailed:
         """Run a command that starts motion, and show it on all pages until it has ended."""
-        client, hub = operator.client, target.hub
+        client, hub, loop = operator.client, target.hub, asyncio.get_running_loop()
         goal = RunningGoal(
             0,
             asked.command,
@@ -217,7 +215,8 @@ class CommandRunner:
 
         def on_sent(payload: Payload) -> None:
             sent.append(payload)
-            hub.sent_goal(number, action_of(payload, "goal"))
+            # Later, because the engine is at work now.
+            loop.call_soon(hub.sent_goal, number, action_of(payload, "goal"))
 
         try:
             replied = await target.command(
@@ -281,18 +280,18 @@ class CommandRunner:
         is_goal = known.send.options.get("verb") == "goal"
         if not is_goal and not starts_motion(known, asked.arguments):
             return None
-
-        stops = self._controls.controller.lease.state.stops
-        late = asked if asked.stops is not None else structs.replace(asked, stops=stops)
+        stops = asked.stops
+        if stops is None:
+            stops = self._controls.controller.lease.state.stops
 
         def check() -> str:
-            if is_over():
+            """Read the rights only: the engine, which asks, must not be called from here."""
+            if is_over() and not known.steps:  # a sequence goes on without its page
                 return NOT_AWAITED
-            try:
-                self._admit(operator, late)
-            except CommandRefused as refused:
-                return refused.message
-            return ""
+            if not operator.rights.may_give(asked.command):
+                return OUT_OF_SCOPE
+            client = operator.client._replace(role=operator.rights.role())
+            return self._controls.once.refusal(client, asked.command, asked.arguments, stops)
 
         return check
 
