@@ -24,7 +24,7 @@ HERE_NS = 1_700_000_000 * 10**9
 def test_the_simulated_time_is_the_newest_clock(
     encoding: str | None, body: object, names: tuple[str, str]
 ) -> None:
-    clock = RobotTime(is_simulated=True)
+    clock = RobotTime(clock_only=True)
     assert clock.now(HERE_NS) == (0, 0)
     assert clock.clock(encoding, body) is None
     clock.told(HERE_NS + 10**12, HERE_NS)  # other messages of the robot do not count
@@ -48,14 +48,14 @@ def test_the_simulated_time_is_the_newest_clock(
     ],
 )
 def test_invalid_messages_change_nothing(encoding: str | None, body: object) -> None:
-    clock = RobotTime(is_simulated=True)
+    clock = RobotTime(clock_only=True)
     clock.clock(None, {"clock": {"sec": 5, "nanosec": 6}})
     assert clock.clock(encoding, body) is None
     assert clock.now(HERE_NS) == (5, 6)
 
 
 def test_a_clock_that_goes_back_is_reported() -> None:
-    clock = RobotTime(is_simulated=True)
+    clock = RobotTime(clock_only=True)
     clock.clock(None, {"clock": {"sec": 5, "nanosec": 0}})
     told = clock.clock(None, {"clock": {"sec": 2, "nanosec": 500_000_000}})
     assert told is not None

@@ -62,7 +62,7 @@ class FoxgloveTransport:
             wishes: topics to subscribe to, without duplicates.
             ros: ROS version declared in the document; None if undeclared.
             goals: record of unfinished goals that other transports share; None for a new record.
-            clock_only: see `FoxgloveSession`.
+            clock_only: see `RobotTime`.
         """
         self._wire = wire
         self._where = where

@@ -112,12 +112,10 @@ class FoxgloveSession:
             graph: object that reports topics with mistakes.
             call_at: function that schedules a call for a given time on `clock`.
             clock: monotonic clock, in seconds.
-            published: type of each published topic, keyed by topic and encoding. The mapping
-                persists across connections, so that a new connection announces all these topics
-                immediately.
+            published: type of each published topic, keyed by topic and encoding. All connections
+                of a transport share it, so that a new one announces these topics at once.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
-            clock_only: None for the robot's own time. Otherwise, the time is that of the topic
-                ``/clock``, and true means that the driver does not read this topic.
+            clock_only: see `RobotTime`.
             flush: function that sends the written frames soon.
         """
         self.queue = queue
@@ -137,7 +135,6 @@ class FoxgloveSession:
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
         self._own_calls: dict[int, Callable[[ServiceReply | None, str], None]] = {}
-        """Functions that receive the replies to the session's own calls."""
         self._results: dict[int, str] = {}
         """Goal of each pending call for a result, keyed by the call's number."""
         self._flush = flush
@@ -146,8 +143,7 @@ class FoxgloveSession:
         self._graph_topics = FoxgloveTopics()
         self._published_s = float("-inf")
         self._number = 0
-        self._time = RobotTime(is_simulated=clock_only is not None)
-        self._is_clock_only = clock_only is True
+        self._time = RobotTime(clock_only)
         self._told: set[str] = set()
         self._retries: Counter[str] = Counter()
         self._bad = 0
@@ -298,7 +294,7 @@ class FoxgloveSession:
             restarted = self._time.clock(one.channel.encoding, said.data)
             if restarted is not None:
                 self.queue.answer(restarted)
-            if self._is_clock_only:
+            if self._time.is_clock_only:
                 return
         throttle_s = one.wish.throttle_s
         if not throttle_s:

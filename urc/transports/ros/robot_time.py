@@ -31,13 +31,15 @@ _KEPT_NS: Final = 2_000_000_000
 class RobotTime:
     """The robot's time; an estimate is this machine's time before the first message."""
 
-    def __init__(self, *, is_simulated: bool = False) -> None:
+    def __init__(self, clock_only: bool | None = None) -> None:
         """Begin without a known time.
 
         Args:
-            is_simulated: whether the time is that of ``/clock``, and nothing else.
+            clock_only: None for an estimate. Otherwise, the time is that of ``/clock`` and nothing
+                else, and true means that the driver does not read this topic.
         """
-        self.is_simulated = is_simulated
+        self.is_simulated = clock_only is not None
+        self.is_clock_only = clock_only is True
         self._difference_ns = 0
         self._taken_ns: int | None = None
         self._clock_ns = 0

@@ -95,7 +95,7 @@ class RosbridgeTransport:
             goals: record of unfinished goals that other transports share; None for a new record.
             spare: function that returns a new transport to the same bridge, for calls that may
                 block a connection; None to make no such calls.
-            clock_only: see `RosClient`.
+            clock_only: see `RobotTime`.
         """
         self._wire = wire
         self._spare = spare

@@ -69,11 +69,10 @@ class RosClient:
             ros: ROS version of type names; None keeps names as written.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
             clock: monotonic clock, in seconds.
-            clock_only: None if the bridge replaces ``now`` by its own time. Otherwise, the time is
-                that of the topic ``/clock``, and true means that the driver does not read it.
+            clock_only: None if the bridge replaces ``now`` by its own time; otherwise, see
+                `RobotTime`.
         """
-        self._time = RobotTime(is_simulated=clock_only is not None)
-        self._is_clock_only = clock_only is True
+        self._time = RobotTime(clock_only)
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -313,7 +312,7 @@ class RosClient:
             restarted = self._time.clock(None, body)
             if restarted is not None:
                 self._queue.answer(restarted)
-            if self._is_clock_only:
+            if self._time.is_clock_only:
                 return
         self._queue.message(topic, envelope, self._size_bytes)
 

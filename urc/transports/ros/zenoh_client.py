@@ -220,7 +220,7 @@ class _RosNode:
         self._fresh: dict[str, None] = {}
         """Published topics whose subscribers have not been checked."""
         self._tokens: dict[str, TopicToken] = {}
-        self._time = RobotTime(is_simulated=options.clock_only is not None)
+        self._time = RobotTime(options.clock_only)
         self._loop = asyncio.get_running_loop()
         self._timers: list[asyncio.TimerHandle] = []
 
@@ -303,7 +303,7 @@ class _RosNode:
             restarted = self._time.clock("cdr", data)
             if restarted is not None:
                 self.session.queue.answer(restarted)
-            if self._options.clock_only:
+            if self._time.is_clock_only:
                 return
         now_s = self._loop.time()
         if one.topic.throttle_s and now_s < one.due_s:
