@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 EXAMPLE = "urc validate puppet"
 
 FORMATS = ("text", "json", "sarif", "github")
+_BROWSER = "emscripten"
+"""Platform of the playground, which opens no transport, so no package is missing there."""
 
 
 class _Report:
@@ -127,7 +129,6 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
     from urc.config.load import WidgetFolder, check
     from urc.runtime.coverage import measure
     from urc.runtime.document_tests import exercise
-    from urc.runtime.missing_packages import missing_packages
     from urc.runtime.registries import built_in_catalog
     from urc.shipped import shipped
 
@@ -150,10 +151,18 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
             report.failed += len(outcome.problems)
             report.add(outcome.problems)
             report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
-        if checked.profile is not None:
-            missing = missing_packages(checked.profile, {}, catalog.transports)
-            report.notes += [f"{path} cannot be opened on this computer: {one}" for one in missing]
+        if checked.profile is not None and sys.platform != _BROWSER:
+            _note_missing_packages(path, checked.profile, report)
     return report
+
+
+def _note_missing_packages(path: str, profile: "Profile", report: _Report) -> None:
+    """Note each extra that the profile needs and this computer lacks."""
+    from urc.runtime.missing_packages import missing_packages
+    from urc.runtime.registries import built_in_catalog
+
+    for text in missing_packages(profile, {}, built_in_catalog().transports):
+        report.notes.append(f"{path} cannot be opened on this computer: {text}")
 
 
 def _examine_folder(

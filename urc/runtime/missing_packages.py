@@ -42,7 +42,7 @@ def missing_packages(
             make_transports(_alone(profile.driver, name), values, table)
         except MissingPackage as fault:
             found.append(str(fault))
-        except UrcError:
+        except (UrcError, ImportError):  # `urc doctor` reports a missing package of the core
             continue
     return tuple(dict.fromkeys(found))
 

@@ -152,3 +152,24 @@ def test_validate_names_the_command_but_reports_no_problem(
     assert summary.startswith("1 document: 0 errors, 0 warnings")
     assert main(["validate", "--format", "json", str(one.profile.file)]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_a_broken_installation_is_no_missing_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A package of the core is missing, as `urc doctor` reports; a check of documents goes on."""
+    file = tmp_path / "rover.yaml"
+    file.write_text(SEVERAL, "utf-8")
+    monkeypatch.setitem(sys.modules, "urc.transports.ros.choice", None)
+    assert main(["validate", str(file)]) == 0
+    assert "cannot be opened" not in capsys.readouterr().err
+
+
+def test_the_playground_needs_no_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    one = robot(tmp_path, "mqtt", "host", "127.0.0.1", TOPIC)
+    remove(monkeypatch, "mqtt")
+    monkeypatch.setattr("urc.cli.validate.sys.platform", "emscripten")
+    assert main(["validate", str(one.profile.file)]) == 0
+    assert capsys.readouterr().err.count("\n") == 1
