@@ -9,6 +9,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
+from tests.e2e.motion.driving import CALM_LEASE_S, USES, commands
 from urc.model.interface import WidgetUse
 from urc.model.values import AlarmAttributes, AlarmLimits, Signal
 from urc.runtime.alarm_table import AlarmQuery, search_alarms
@@ -27,7 +28,7 @@ MODE = Signal(
 )  # fmt: skip
 COUNT = 200
 WATCH = """() => {
-  window.seen = { tones: 0, said: [], longest: 0, flips: 0, titles: new Set(), messages: 0 };
+  window.seen = { tones: 0, said: [], longest: 0, flips: 0, shifted: [] };
   const real = OscillatorNode.prototype.start;
   OscillatorNode.prototype.start = function (...args) {
     seen.tones += 1;
@@ -37,6 +38,13 @@ WATCH = """() => {
   new MutationObserver(() => seen.said.push(said.textContent)).observe(said, { childList: true });
   const strip = document.querySelector('[data-alarm-strip]');
   new MutationObserver(() => { seen.flips += 1; }).observe(strip, { attributeFilter: ['hidden'] });
+  new PerformanceObserver((list) => {
+    for (const { node } of list.getEntries().flatMap(({ sources }) => sources)) {
+      const moved = node instanceof Element ? node : node?.parentElement;
+      const isExpected = moved?.closest(".alerts, [data-alarm-strip]");
+      if (moved && !isExpected) seen.shifted.push(moved.outerHTML);
+    }
+  }).observe({ type: "layout-shift" });
   let last = performance.now();
   const frame = (now) => {
     seen.longest = Math.max(seen.longest, now - last);
@@ -48,8 +56,11 @@ WATCH = """() => {
 
 
 def robot_of(*signals: Signal) -> FakeRobot:
+    """Return a robot with sticks and a list of alarms."""
     profile = dashboard_profile(
-        uses=[WidgetUse("alerts", "alerts")], signals={one.name: one for one in signals}
+        uses=[*USES, WidgetUse("alerts", "alerts")],
+        signals={one.name: one for one in signals},
+        commands=commands(CALM_LEASE_S),
     )
     return FakeRobot(profile)
 
@@ -154,6 +165,7 @@ async def test_200_alarms_in_10_s_stay_quiet_and_none_is_lost(
         assert len(seen["said"]) <= 6, seen
         assert seen["flips"] == 1, "the strip comes once, and stays"
         assert seen["longest"] < 500, seen
+        assert seen["shifted"] == [], "sticks and other widgets stay where they are"
         assert await page.title() == f"▲ {COUNT} · Puppet · URC"
         await page.click("[data-alarm-open]")
         bursts = page.locator("[data-alarm-list] > li")
