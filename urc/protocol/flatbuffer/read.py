@@ -88,6 +88,8 @@ class FlatbufferReader:
         """Function for each member, keyed by the number of the union."""
         self._tables = Tables(b"")
         self._values = self._numbers = self._bytes = 0
+        self.size = 0
+        """Number of prepared fields."""
         try:
             self._plan = self._plan_of(types.number(name), wanted)
         except RecursionError:
@@ -150,6 +152,7 @@ class FlatbufferReader:
             part = wanted if isinstance(wanted, bool) else wanted.get(name, False)
             if not part:
                 continue
+            self.size += 1
             take = self._field(kind, field, part)
             absent: Any = field.default if field.kind.base in CODES else None
             if field.kind.base == VECTOR:

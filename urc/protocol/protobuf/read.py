@@ -112,6 +112,8 @@ class ProtobufReader:
         self._whole: dict[str, _Plan] = {}
         self._data = b""
         self._values = self._numbers = 0
+        self.size = 0
+        """Number of prepared fields."""
         try:
             self._plan = self._plan_of(name.lstrip("."), wanted)
         except RecursionError:
@@ -200,6 +202,7 @@ class ProtobufReader:
     def _add(
         self, plan: _Plan, kind: ProtoMessage, field: ProtoField, name: str, wanted: Wanted
     ) -> None:
+        self.size += 1
         if field.kind == "group":
             raise BadDefinition(f"{kind.name} has the group {field.name}: not supported")
         tag = field.number << 3

@@ -65,6 +65,9 @@ MAX_COMPILED: Final = 256
 announce an unlimited number of new types."""
 MAX_SCHEMAS: Final = 64
 """Maximum number of schemas of Protocol Buffers on one connection."""
+MAX_PREPARED: Final = 100_000
+"""Maximum number of fields in all readers for Protocol Buffers and FlatBuffers; each takes about a
+kilobyte."""
 _SHOWN: Final = 60
 _ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Byte order and largest alignment for CDR and plain CDR2, keyed by encapsulation identifier."""
@@ -151,6 +154,8 @@ class TopicCodec:
         """
         self._nested: set[str] = set()
         """Topics and services whose messages contain the feedback or the result in a field."""
+        self._prepared = 0
+        """Number of fields in the readers for Protocol Buffers and FlatBuffers."""
         self._refused: dict[str, str] = {}
         """Reason why the definition of a topic is unreadable, keyed by topic."""
         self._stops = 0
@@ -164,6 +169,7 @@ class TopicCodec:
         """Discard the definitions of the previous connection."""
         self._sources.clear()
         self._refused.clear()
+        self._prepared = 0
         self._services.clear()
         self._compiled.clear()
         self._known.clear()
@@ -243,6 +249,10 @@ class TopicCodec:
                 found = FlatbufferReader(parse_binary_schema(schema.text), schema.type, wanted)
             else:
                 found = _Source(self._layout(schema), wanted, is_ros1=schema.encoding == "ros1")
+            if not isinstance(found, _Source):
+                self._prepared += found.size
+                if self._prepared > MAX_PREPARED:
+                    raise BadDefinition(f"the robot's types have more than {MAX_PREPARED} fields")
             self._keep(key, found)
         return found
 

@@ -17,10 +17,12 @@ from tests.unit.protocol.protobuf.messages import (
     foxglove_type,
     schema_of,
 )
+from urc.model.payload import Envelope
 from urc.protocol.protobuf.read import MAX_VALUES, ProtobufReader
 from urc.protocol.protobuf.schema import MAX_FIELDS, MAX_TYPES, parse_schema
 from urc.protocol.ros.definition import MAX_TEXT, BadDefinition
 from urc.protocol.ros.read_source import MAX_NUMBERS, BadRosMessage
+from urc.protocol.ros.topic_codec import MAX_PREPARED, TopicCodec
 from urc.protocol.ros.wanted import EACH, wanted_of
 
 KINDS: dict[str, Any] = {name: foxglove_type(name) for name in FOXGLOVE}
@@ -253,3 +255,21 @@ def test_defaults_of_proto2_and_presence_of_editions() -> None:
         new.options.features.field_presence = presence
         field(new.message_type.add(name="A0"), "x", 1, kind=5)
         assert ProtobufReader(parse_schema(text_of(new)), "p.A0").read(b"") == {"x": value}
+
+
+def test_types_that_share_a_large_one_cannot_fill_the_memory_of_a_codec() -> None:
+    file = descriptor_pb2.FileDescriptorProto(name="a.proto", package="p", syntax="proto3")
+    large = file.message_type.add(name="Large")
+    for number in range(1, 5001):
+        field(large, "x", number, kind=5)
+    for place in range(60):
+        field(file.message_type.add(name=f"A{place}"), "large", 1, of=".p.Large")
+    codec, text = TopicCodec(), text_of(file)
+    faults = []
+    for place in range(60):
+        said = {"topic": "/a", "type": f"p.A{place}", "encoding": "protobuf"}
+        faults.append(
+            codec.received(Envelope("definition", {**said, "notation": "protobuf"}, text)).fault
+        )
+    assert faults[0] == ""
+    assert faults[-1] == f"/a: the robot's types have more than {MAX_PREPARED} fields"
