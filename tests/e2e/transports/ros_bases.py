@@ -223,7 +223,8 @@ async def _emulated(folder: Path, prefix: str) -> AsyncIterator[Base]:
                 if told.get("topic") == driven:
                     base.speeds.append(told["msg"]["twist"]["linear"]["x"])
                     stamp = told["msg"]["header"]["stamp"]
-                    base.stamps.append((stamp["sec"], stamp["nanosec"]))
+                    if stamp != "now":  # the bridge itself inserts its time
+                        base.stamps.append((stamp["sec"], stamp["nanosec"]))
 
         task = asyncio.create_task(listen())
         try:
