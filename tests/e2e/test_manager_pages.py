@@ -360,6 +360,8 @@ async def test_each_transport_of_a_tested_address_is_named(
         await expect(told).to_have_text(
             [re.compile(r"^▲ base: 127\.0\.0\.1:1 refuses"), "● arm: answers"]
         )
+        colours = await told.evaluate_all("(all) => all.map((one) => getComputedStyle(one).color)")
+        assert len(set(colours)) == 2
 
 
 async def test_the_dev_interface(new_page: PageMaker, tmp_path: Path) -> None:

@@ -34,6 +34,9 @@ const VERDICTS = {
   fails: ["▲", mark("not reached")],
 };
 
+/** @type {Record<Line["verdict"], string>} */
+const TONES = { answers: "good", opens: "caution", fails: "bad" };
+
 const root = part(document, "[data-settings]");
 const form = /** @type {HTMLFormElement} */ (part(root, "[data-form]"));
 const said = part(root, "[data-said]");
@@ -172,7 +175,6 @@ function mistakes(faults) {
     told.textContent = text && `▲ ${text}`;
     told.hidden = !text;
     const field = box.querySelector("input, select");
-    told.dataset["tone"] = "";
     delete told.dataset["tested"];
     if (text) field?.setAttribute("aria-invalid", "true");
     else field?.removeAttribute("aria-invalid");
@@ -194,8 +196,10 @@ function showResults(some) {
     const told = box.querySelector("[data-fault]");
     const verdict = here[0]?.verdict; // the worst
     if (!verdict || !(told instanceof HTMLElement) || !told.hidden) continue;
-    told.replaceChildren(...here.map((one) => made("span", { class: "urc-result" }, resultOf(one, some.length > 1))));
-    told.dataset["tone"] = { answers: "good", opens: "caution" }[String(verdict)] ?? "";
+    told.replaceChildren(...here.map((one) => {
+      const about = { class: "urc-result", "data-tone": TONES[one.verdict] };
+      return made("span", about, resultOf(one, some.length > 1));
+    }));
     told.dataset["tested"] = "";
     told.hidden = false;
     if (verdict === "fails") box.querySelector("input, select")?.setAttribute("aria-invalid", "true");
