@@ -10,7 +10,10 @@ from starlette.testclient import TestClient
 from tests.contract.profiles import profile_of
 from tests.contract.test_protocols import Conversation
 from urc.config.load import WidgetFolder, check
+from urc.model.payload import Envelope
 from urc.problems import to_text
+from urc.protocol.engine import Engine
+from urc.protocol.events import Noted
 from urc.runtime.coverage import measure
 from urc.runtime.document_tests import exercise, sample_settings
 from urc.runtime.registries import built_in_catalog
@@ -136,3 +139,22 @@ def test_its_emulated_robot_says_all_that_there_is(file: Path) -> None:
     refused = {name: line.last_fault for name, line in talk.lines.items() if line.faults}
     assert (talk.faults, refused) == ([], {})
     assert set(profile.driver.signals) - talk.read - ON_THE_WAY - GIVEN == set()
+
+
+@pytest.mark.parametrize("least", ["info", "warning", "error"])
+@pytest.mark.parametrize("name", ["generic-ros1", "generic-ros2", "ur-ros2"])
+def test_the_log_of_ros_nodes_begins_at_the_level_of_the_setting(name: str, least: str) -> None:
+    """The levels are those of rosgraph_msgs/Log and rcl_interfaces/Log, from debug to fatal."""
+    profile = profile_of(FOLDER / f"{name}.yaml")
+    settings = {**sample_settings(profile.settings), "log_level": least}
+    engine = Engine(profile.driver, settings)
+    engine.start("ros", 0.0)
+    levels = [1, 2, 4, 8, 16] if name == "generic-ros1" else [10, 20, 30, 40, 50]
+    found = []
+    for level in levels:
+        body = {"level": level, "name": "/node", "msg": "text"}
+        said = Envelope("message", {"topic": "/rosout"}, body)
+        found += [one for one in engine.receive("ros", said, 1.0) if isinstance(one, Noted)]
+    words = ["info", "warning", "error", "error"]
+    assert [one.level for one in found] == words[words.index(least) :]
+    assert {one.text for one in found} == {"/node: text"}
