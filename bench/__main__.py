@@ -31,6 +31,7 @@ NAMES = (
     "browser_turtlebot",
     "ros_lines",
     "page_layouts",
+    "operator_tasks",
     "playground",
     "browser_frames",
     "browser_firefox",
@@ -63,6 +64,7 @@ PROGRAMS = {
     "browser_firefox": ("firefox", "node", "puppeteer"),
     "browser_webkit": ("webkit-driver", "xvfb"),
     "page_layouts": ("chromium",),
+    "operator_tasks": ("chromium",),
     "playground": ("chromium", "node", "pyodide", "axe"),
     "motion_input": ("chromium",),
 }

@@ -14,6 +14,7 @@ DECISION_S, TOUCH_S, KEY_S = 1.35, 1.10, 0.28
 """Times of the keystroke-level model (Card, Moran and Newell, 1980), in seconds: the choice of the
 next step (M), pointing at a target (P), and a key press of an average typist (K)."""
 
+SWIPE_STEPS, REST_MS = 8, 150
 UNCOVERED = """(el) => {
   const { left, right, top, bottom } = el.getBoundingClientRect();
   const [x, y] = [(left + right) / 2, (top + bottom) / 2];
@@ -117,6 +118,16 @@ class OperatorInput:
     async def lift(self, finger: int = 1) -> None:
         """Lift a finger."""
         await self._fingers.lift(finger)
+
+    async def swipe(self, x: float, y: float, up: float) -> None:
+        """Move the content up with a finger that goes up from a place and then rests."""
+        self.decide()
+        self.swipes += 1
+        for step in range(SWIPE_STEPS + 1):
+            await self._fingers.put(1, x, y - up * step / SWIPE_STEPS)
+        await self.page.wait_for_timeout(REST_MS)  # a finger that rests throws nothing
+        await self._fingers.put(1, x, y - up)
+        await self._fingers.lift(1)
 
     async def press(self, key: str) -> None:
         """Press a key."""

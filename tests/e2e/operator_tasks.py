@@ -5,7 +5,7 @@ from playwright.async_api import Locator, Page
 from tests.e2e.dashboards import until
 from tests.e2e.operator_input import OperatorInput, Told
 
-__all__ = ["Hand", "Keys", "Touch"]
+__all__ = ["CARD", "SKIP", "STICK", "Hand", "Keys", "Touch"]
 
 FULL_PX = 120
 """Push of a stick beyond its rim, in pixels."""
