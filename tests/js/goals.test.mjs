@@ -102,8 +102,17 @@ test("the page's own route ends by its reply, or by the server if its reply is l
   share(made);
   assert.equal(made.active, own, "its reply is under way");
   const lost = choice({ sent: 1, active: { ...own, goal: 3, isLost: true } });
+  share(lost, { ...GOAL, isOurs: true, isLost: true });
   share(lost);
   assert.deepEqual([lost.active, lost.left], [null, [""]]);
+});
+
+test("the page's own route stays lost if the server knows no more than the page", () => {
+  const made = choice({ sent: 1, active: { number: 1, goal: 0, route: null, at: 0, end: "", isLost: false, isHeld: false } });
+  share(made, { ...GOAL, isOurs: true });
+  made.active.isLost = true;
+  share(made);
+  assert.deepEqual([made.active?.isLost, made.left], [true, []]);
 });
 
 test("a route that this page has sent, and whose reply has arrived, is not adopted for a moment", () => {

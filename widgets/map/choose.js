@@ -24,6 +24,7 @@
  * @property {"" | "pause" | "clear"} end Why the operator ends it.
  * @property {boolean} isEnding Whether the request to end it is under way.
  * @property {boolean} isLost Whether its outcome is unknown.
+ * @property {boolean} isHeld Whether the server holds it, although its outcome is unknown.
  * @property {ActiveRoute | null} before The route that it replaces, until the robot has accepted it.
  */
 import { attribute, button, write } from "urc/kit";
@@ -506,7 +507,7 @@ export class Choice {
     if (!isPlace) {
       const { serial } = this.feedback;
       const before = this.active;
-      this.active = { route: this.route.rest(0), number, goal: 0, by: "", at: 0, serial, end: "", isEnding: false, isLost: false, before };
+      this.active = { route: this.route.rest(0), number, goal: 0, by: "", at: 0, serial, end: "", isEnding: false, isLost: false, isHeld: false, before };
     }
     this.isBusy = true;
     this.outcome = `… ${this.t("sending")}`;

@@ -2,7 +2,9 @@
 /**
  * The goals and routes of all pages, as the server tells of them.
  *
- * The server tells of a goal until its end, so a goal that is missing has ended. Of goals from before
+ * The server tells of a goal until its end, so a goal of another page that is missing has ended. The
+ * outcome of a command without a ROS action can be unknown to the server, too: this page's own lost
+ * route counts as ended only if the server has held it as lost. Of goals from before
  * its own restart, the server knows nothing: they are lost until somebody ends them.
  *
  * @typedef {import("./choose.js").Choice} Choice
@@ -41,12 +43,15 @@ function shareRoute(choice, goal) {
   const { active } = choice;
   if (active?.goal && active.goal !== goal?.number) {
     if (active.number === 0 && active.end === "") choice.active = null; // ended elsewhere
-    else if (active.number === 0 || active.isLost) choice.leftOver(active);
+    else if (active.number === 0 || (active.isLost && active.isHeld)) choice.leftOver(active);
   }
   if (!goal) return;
   const now = choice.active;
   if (goal.isOurs && choice.sent > 0) {
-    if (now && now.number > 0) now.goal = goal.number; // the reply tells of its end
+    if (now && now.number > 0) {
+      now.goal = goal.number; // the reply tells of its end
+      now.isHeld = goal.isLost;
+    }
   } else if (now === null || (now.number === 0 && [0, goal.number].includes(now.goal))) {
     adopt(choice, goal);
   }
@@ -69,6 +74,6 @@ function adopt(choice, goal) {
   if (!route) return;
   const { told } = feedback;
   const serial = told && told.time < since ? told.serial : -1; // of an earlier route
-  choice.active = { route, number: 0, goal: number, by, at: 0, serial, end: "", isEnding: false, isLost, before: null };
+  choice.active = { route, number: 0, goal: number, by, at: 0, serial, end: "", isEnding: false, isLost, isHeld: isLost, before: null };
   if (told) choice.advance(told);
 }

@@ -261,8 +261,9 @@ async def test_a_page_that_is_opened_later_shows_the_route_and_ends_it(
     new_page: PageMaker, opened: str, name: str
 ) -> None:
     """The server holds the points; the present waypoint of an earlier route does not count."""
-    page = await new_page(size="desktop")
+    page, watching = await new_page(size="desktop"), await new_page(size="desktop")
     async with followed(page) as robot:
+        await watching.goto(page.url)  # it keeps the robot connected during the reload
         robot.set_reading("waypoint", 2)  # of an earlier route
         await drawn(page, (1, 0), (2, 0), (3, 1))
         await sent(page, robot)
