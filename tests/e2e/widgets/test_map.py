@@ -15,6 +15,7 @@ from tests.e2e.motion.driving import centre
 from tests.e2e.widgets.viewing import shown
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal
 from urc.protocol.values.occupancy_grid import Grid, encode_grid
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -32,7 +33,7 @@ AT = {"x": "px", "y": "py", "yaw": "turned"}
 
 def told(name: str, *arguments: str) -> Command:
     """Return a command that is given once."""
-    return Command(name, "wire", None, {each: Argument(each) for each in arguments})  # type: ignore[arg-type]
+    return Command(name, "wire", WriteSpec("text"), {each: Argument(each) for each in arguments})
 
 
 def walls(side: int = 8) -> bytes:

@@ -18,6 +18,7 @@ from tests.e2e.widgets.inputs import drag
 from tests.e2e.widgets.viewing import METRES, RESTED, shown
 from urc.model.driver import Argument, Command
 from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
@@ -36,7 +37,9 @@ BESIDE = """() => {
 
 def told(name: str, *arguments: str, kind: Any = "number") -> Command:
     """Return a command that is given once."""
-    return Command(name, "wire", None, {each: Argument(each, kind) for each in arguments})  # type: ignore[arg-type]
+    return Command(
+        name, "wire", WriteSpec("text"), {each: Argument(each, kind) for each in arguments}
+    )
 
 
 async def test_distances_around_the_robot(new_page: PageMaker) -> None:
@@ -374,7 +377,7 @@ async def test_a_panorama_is_looked_around_in(new_page: PageMaker) -> None:
     )
     quarters = [RED] * 16 + [GREEN] * 16 + [BLUE] * 16 + [GREY] * 16
     page = await new_page(size="desktop")
-    commands = {"take": Command("take", "wire", None)}  # type: ignore[arg-type]
+    commands = {"take": Command("take", "wire", WriteSpec("text"))}
     async with shown(page, signals, *uses, commands=commands) as robot:
         robot.set_reading("around", png([quarters] * 32))
         faces = [f"[data-cell='{cell}'] .pano360-face" for cell in (0, 1)]
