@@ -1,20 +1,31 @@
-"""The layout of a binary message that contains a signal's image or other bytes.
+"""The layout of binary messages that contain a signal's image, other bytes, or part of a video.
 
-Layer 3½. Pure::
+Layer 3½. Pure. An image, or other bytes::
 
     0  u8   1: an image             4  u32  its age in milliseconds at the moment of encoding
     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
     2  u16  index of the signal    16       media type in ASCII, then the bytes
+
+An access unit of a video has 2 as its first byte, and the codec string in place of the media type.
+Nine bytes follow the common header::
+
+   16  u32  number of the unit     22  u16  height in pixels
+   20  u16  width in pixels        24  u8   1 for a keyframe
+
+The numbers of one signal are consecutive. After a gap, the next unit is a keyframe.
 """
 
 import struct
 from typing import Final, NamedTuple
 
-__all__ = ["PICTURE", "PICTURE_HEADER", "PictureMessage", "read_picture"]
+__all__ = ["PICTURE", "PICTURE_HEADER", "VIDEO", "VIDEO_HEADER", "PictureMessage", "read_picture"]
 
 PICTURE: Final = 1
-"""First byte of the message, which marks its kind."""
+"""First byte of a message with an image, which marks its kind."""
+VIDEO: Final = 2
+"""First byte of a message with an access unit."""
 PICTURE_HEADER: Final = struct.Struct(">BBHId")
+VIDEO_HEADER: Final = struct.Struct(">BBHIdIHHB")
 
 
 class PictureMessage(NamedTuple):
