@@ -9,7 +9,8 @@ import sys
 
 import gi
 
-gi.require_version("GstRtspServer", "1.0")
+for name in ("Gst", "GstRtsp", "GstRtspServer"):
+    gi.require_version(name, "1.0")
 from gi.repository import GLib, Gst, GstRtsp, GstRtspServer  # noqa: E402 - after its version
 
 Gst.init(None)
