@@ -18,6 +18,8 @@ The numbers of one signal are consecutive. After a gap, the next unit is a keyfr
 import struct
 from typing import Final, NamedTuple
 
+from urc.video import VideoUnit, encode_unit, read_unit
+
 __all__ = ["PICTURE", "PICTURE_HEADER", "VIDEO", "VIDEO_HEADER", "PictureMessage", "read_picture"]
 
 PICTURE: Final = 1
@@ -35,13 +37,28 @@ class PictureMessage(NamedTuple):
     """The signal's index in the `names` of `HelloMessage`."""
     age_ms: int
     data: bytes
+    """The image, other bytes, or an access unit as the value of a signal without its time."""
 
 
 def read_picture(message: bytes) -> PictureMessage | None:
     """Return the content of a binary message; None for other kinds of messages."""
+    if message[:1] == bytes((VIDEO,)):
+        return _read_video(message)
     if len(message) < PICTURE_HEADER.size:
         return None
     kind, type_length, index, age_ms, _ = PICTURE_HEADER.unpack_from(message)
     if kind != PICTURE:
         return None
     return PictureMessage(index, age_ms, message[PICTURE_HEADER.size + type_length :])
+
+
+def _read_video(message: bytes) -> PictureMessage | None:
+    if len(message) < VIDEO_HEADER.size:
+        return None
+    _, length, index, age_ms, _, _, width, height, is_key = VIDEO_HEADER.unpack_from(message)
+    start = VIDEO_HEADER.size + length
+    codec = message[VIDEO_HEADER.size : start].decode("latin-1")
+    if not codec.isascii() or start >= len(message):
+        return None
+    value = encode_unit(VideoUnit(codec, is_key == 1, width, height, 0.0, message[start:]))
+    return None if read_unit(value) is None else PictureMessage(index, age_ms, value)

@@ -9,11 +9,12 @@ import pytest
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
 from urc.testing.clock import FakeClock, settle
-from urc.video import VideoUnit, encode_unit
+from urc.video import VideoUnit, encode_unit, read_unit
 from urc.web.feed import video_stills
 from urc.web.feed.fanout import Fanout, Place
 from urc.web.feed.video_feed import GROUP_BYTES, VideoFeed, VideoSubscription
 from urc.web.wire import messages as wire
+from urc.web.wire.picture import encode_video
 from urc.wire.client_messages import ImageSelection
 from urc.wire.picture import VIDEO_HEADER, read_picture
 
@@ -76,7 +77,18 @@ def test_a_unit_says_all_that_a_decoder_needs(desk: Desk) -> None:
     assert parts(frame) == (1, 0, 640, 480, 1, 1, "avc1.42", b"K1")
     header = struct.unpack(">BBHIdIHHB", frame[2:27])
     assert header[4] == round(desk.clock.now() * 1000)
-    assert read_picture(frame[2:]) is None  # programs that read images skip it
+    message = read_picture(frame[2:])  # what a program receives from the server
+    assert message is not None
+    assert message[:2] == (1, 0)
+    assert read_unit(message.data) == VideoUnit("avc1.42", True, 640, 480, 0.0, b"K1")
+
+
+@pytest.mark.parametrize("length", range(35))
+def test_a_truncated_message_is_no_unit(length: int) -> None:
+    whole = encode_video(1, VideoUnit("avc1.42", True, 640, 480, 0.0, b"123"), 1, 0, 0)
+    assert len(whole) == 35
+    found = read_picture(whole[:length])
+    assert found is None or length > 25 + len("avc1.42")
 
 
 def test_a_new_page_starts_with_the_keyframe_of_the_newest_group(desk: Desk) -> None:
