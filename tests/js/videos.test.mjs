@@ -135,6 +135,16 @@ test("a damaged image costs one fault; three make the page request JPEG", () => 
   assert.equal(told.refused, 1);
 });
 
+test("faults far apart do not end the video", () => {
+  const { worker, told, videos } = page();
+  for (let number = 1; number <= 1000; number += 1) {
+    videos.take(unit({ number, isKey: false }), 1000);
+    if (number % 150 === 0) worker.says({ signal: "eye", fault: "Decoding error." });
+    else worker.says({ signal: "eye", number, bitmap: new Bitmap() });
+  }
+  assert.equal(told.refused, 0);
+});
+
 test("without a secure context all videos are requested as JPEG", () => {
   const { videos } = page();
   videos.canDecode = false;

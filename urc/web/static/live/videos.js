@@ -9,6 +9,8 @@ import { scriptUrl } from "../core/trusted_scripts.js";
 
 /** Number of faults of a video after which the page requests JPEG images. */
 const MOST_FAULTS = 3;
+/** Number of images in sequence after which earlier faults no longer count: datagrams may be lost at any time. */
+const FORGIVEN_AFTER = 100;
 /** Maximum number of access units without an image; the browser then decodes too slowly, or not at all. */
 const MOST_TIMES = 2000;
 
@@ -29,7 +31,7 @@ export class Videos {
     this.worker = null;
     /** Time of each access unit in the decoder, by signal and number. @type {Map<string, Map<number, number>>} */
     this.times = new Map();
-    /** Number of faults of each video. @type {Map<string, number>} */
+    /** Faults of each video, and the images since the last one. @type {Map<string, {count: number, images: number}>} */
     this.faults = new Map();
     /** Videos that the page cannot decode. @type {Set<string>} */
     this.stills = new Set();
@@ -94,6 +96,8 @@ export class Videos {
       if (known > (number ?? 0)) break;
       times?.delete(known);
     }
+    const faults = this.faults.get(signal);
+    if (faults && (faults.images += 1) >= FORGIVEN_AFTER) this.faults.delete(signal);
     this.store.videoImage(signal, bitmap, timeMs);
     this.changed();
   }
@@ -103,8 +107,8 @@ export class Videos {
    * @param {string} fault
    */
   fail(signal, fault) {
-    const count = (this.faults.get(signal) ?? 0) + 1;
-    this.faults.set(signal, count);
+    const count = (this.faults.get(signal)?.count ?? 0) + 1;
+    this.faults.set(signal, { count, images: 0 });
     console.info(`URC: the video ${signal} cannot be decoded:`, fault);
     if (count < MOST_FAULTS && !/^[a-z0-9.]+$/i.test(fault)) return;
     this.stills.add(signal);
