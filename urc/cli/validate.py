@@ -41,6 +41,8 @@ class _Report:
         """Problems in command-line order, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []
         """Test coverage of each tested profile."""
+        self.lacks: dict[str, None] = {}
+        """Missing libraries of this computer, which are no mistakes in the documents."""
         self.looked_at: dict[str, None] = {}
         """Paths of all files that affect the result, including missing files."""
 
@@ -141,6 +143,7 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
             _examine_folder(path, checked.widget, report)
         if checked.profile is not None:
             _examine_own_widgets(checked.profile, report)
+            _examine_libraries(checked.profile, report)
         if checked.profile is not None and with_tests:
             outcome = exercise(checked.profile)
             report.tests += len(checked.profile.tests)
@@ -170,6 +173,15 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
     for widget in profile.widgets.values():
         if widget.folder.resolve().parent != home:
             _examine_folder(str(widget.folder / "widget.yaml"), widget, report, with_demo=False)
+
+
+def _examine_libraries(profile: "Profile", report: _Report) -> None:
+    """Add the missing library of a camera. Other transports would take too long to import."""
+    if any(one.type == "camera" for one in profile.driver.transports.values()):
+        from urc.transports.camera import missing_library
+
+        if lack := missing_library():
+            report.lacks[lack] = None
 
 
 def _document_in(path: str) -> str:
@@ -217,6 +229,8 @@ def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = 
             print(tell(problem), flush=True)
         if arguments.coverage:
             _print_coverage(report)
+        for lack in report.lacks:
+            complain(lack)
         complain(_summary(report))
 
 

@@ -1,8 +1,11 @@
 """Parts of the camera transport: options, the bounds of a stream, and what the relay refuses."""
 
+from pathlib import Path
+
 import pytest
 
 from tests.unit.test_video import baseline_sps
+from urc.cli.main import main
 from urc.images import MAX_PIXELS
 from urc.transports import camera
 from urc.transports.base import MissingPackage, Transport, TransportError, TransportSetup
@@ -180,3 +183,23 @@ def test_a_password_as_plain_text_is_held_back_if_the_document_says_digest(at: i
 def test_a_digest_is_sent() -> None:
     said = b'DESCRIBE rtsp://c/ RTSP/1.0\r\nAuthorization: Digest username="u"\r\n\r\n'
     assert RtspWatch(refuses_basic=True).sent(said) == ""
+
+
+def test_validate_names_the_missing_library_and_finds_no_mistake(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "eye.yaml"
+    file.write_text(
+        "urc: 1\nkind: robot\nname: eye\n"
+        'transports:\n  eye: { type: camera, url: "rtsp://10.0.0.2/" }\n'
+        "signals:\n  picture: { type: video }\n"
+        "messages:\n  picture: { raw: picture }\n",
+        "utf-8",
+    )
+    assert main(["validate", str(file)]) == 0
+    assert "needs the package" not in capsys.readouterr().err
+    monkeypatch.setattr(camera, "find_spec", lambda _: None)
+    assert main(["validate", str(file)]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert told[0].startswith("camera needs the package av: ")
+    assert told[1].startswith("1 document: 0 errors, 0 warnings")
