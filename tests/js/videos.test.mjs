@@ -103,6 +103,23 @@ test("an image without a unit of this connection is not shown", () => {
   assert.equal(store.reading("eye", 1000).state, "none");
 });
 
+test("images that a camera with B-frames sends in another order are all shown", () => {
+  const { store, worker, told, videos } = page();
+  for (const number of [1, 2, 3, 4]) videos.take(unit({ number, sentMs: 33 * number, ageMs: 0 }), 33 * number);
+  for (const number of [1, 3, 2, 4]) worker.says({ signal: "eye", number, bitmap: new Bitmap() });
+  assert.equal(told.changed, 4);
+  assert.equal(store.reading("eye", 140).time, 0.132);
+});
+
+test("what the decoder leaves out takes no memory", () => {
+  const { worker, videos } = page();
+  for (let number = 1; number <= 500; number += 1) {
+    videos.take(unit({ number }), 1000);
+    if (number % 10 === 0) worker.says({ signal: "eye", number, bitmap: new Bitmap() });
+  }
+  assert.ok((videos.times.get("eye")?.size ?? 0) < 30);
+});
+
 test("the earlier image is closed", () => {
   const { worker, videos } = page();
   const [first, second] = [new Bitmap(), new Bitmap()];

@@ -11,6 +11,8 @@ import { scriptUrl } from "../core/trusted_scripts.js";
 const MOST_FAULTS = 3;
 /** Number of images in sequence after which earlier faults no longer count: datagrams may be lost at any time. */
 const FORGIVEN_AFTER = 100;
+/** Number of access units by which an image may leave the decoder early: a camera with B-frames reorders images. */
+const MOST_REORDERED = 16;
 /** Maximum number of access units without an image; the browser then decodes too slowly, or not at all. */
 const MOST_TIMES = 2000;
 
@@ -91,9 +93,9 @@ export class Videos {
       bitmap.close();
       return;
     }
-    // Images leave the decoder in order, so the earlier ones are dropped or shown.
+    times?.delete(number ?? -1);
     for (const known of times?.keys() ?? []) {
-      if (known > (number ?? 0)) break;
+      if (known > (number ?? 0) - MOST_REORDERED) break;
       times?.delete(known);
     }
     const faults = this.faults.get(signal);
