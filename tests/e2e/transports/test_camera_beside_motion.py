@@ -90,7 +90,7 @@ class Scene:
         assert self.cart.heard[-1][1] == "V 0"
         last_s = max(at_s for at_s, text in self.cart.heard if text == "V 0.5")
         first_s = min(at_s for at_s, text in self.cart.heard[count:] if text == "V 0")
-        assert first_s - last_s < 0.3
+        assert first_s - last_s < 2.0  # the tests of motion measure the lease
 
     async def pictures(self) -> None:
         """Wait for a new picture."""
