@@ -22,6 +22,7 @@ import pytest
 from hypothesis import settings
 
 from scripts.needs import NEEDS
+from tests import open_databases
 from tests.effort import examples, seed
 from tests.sampling import left_out
 
@@ -31,6 +32,8 @@ os.environ["URC_DATA_DIR"] = DATA.name
 
 # Python's own threshold checks all new objects 1,400 times while the tests are collected.
 gc.set_threshold(200_000, 20, 50)
+
+open_databases.watch()
 
 # Properties that name no number of their own; a busy machine is no failure.
 settings.register_profile("urc", max_examples=examples(100), deadline=None)
@@ -110,6 +113,7 @@ def needs_of(item: pytest.Item) -> set[str]:
 
 def pytest_collection_finish() -> None:
     """Exempt modules and tests from garbage collection; they exist until the end of the run."""
+    open_databases.left_open(is_last=True)  # of modules, not of a test
     gc.freeze()
 
 
@@ -136,6 +140,16 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
     for name in sorted(needs_of(item)):
         if PROGRAMS[name].find() is None:
             pytest.fail(f"{name} is not installed; ./dev test brings it", pytrace=False)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """Fail a test that leaves a database open; servers of the e2e tests end with their module."""
+    result = yield
+    left = open_databases.left_open(is_last=nextitem is None or nextitem.path != item.path)
+    if left and "e2e" not in item.path.parts:
+        pytest.fail("left open: " + "; ".join(left), pytrace=False)
+    return result
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

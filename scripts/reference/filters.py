@@ -55,6 +55,10 @@ EXAMPLES: Mapping[str, tuple[str, str]] = {
     "min": ("[4, 5] | min", "smallest number"),
     "numbers": ("'4f4b' | hexbytes | numbers('u8')", "list of numbers, decoded from bytes"),
     "pad": ("7 | pad(4)", "text padded on the left with zeros or another character"),
+    "pick": (
+        "[7, 8] | pick(['a', 'b'], ['b', 'a'])",
+        "values of the named elements, from a list of values and a list of their names",
+    ),
     "pitch": ("[0, 0, 0, 1] | pitch", "pitch of a quaternion [x, y, z, w], in radians"),
     "poses": (
         "[1] | poses([2])",

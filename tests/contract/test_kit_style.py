@@ -60,3 +60,13 @@ def test_every_class_of_the_kit_is_used() -> None:
     names = {name for selector, _ in KIT for name in re.findall(r"\.(urc-[\w-]+)", selector)}
     assert names
     assert {name for name in names if name not in used} == set()
+
+
+@pytest.mark.parametrize(
+    "file",
+    sorted((*STATIC.rglob("*.css"), *shipped("widgets").rglob("*.css"))),
+    ids=lambda file: f"{file.parent.name}/{file.name}",
+)
+def test_nothing_is_blurred(file: Path) -> None:
+    """A blur over a live picture is computed anew for each image, by the processor."""
+    assert not re.search(r"backdrop-filter|\bblur\(", file.read_text("utf-8"))

@@ -364,3 +364,25 @@ def test_each_theme_can_be_read(theme: str) -> None:
         ("on-stop", "stop-pressed"),
     ]
     assert [pair for pair in pairs if contrast(*pair) < least] == []
+
+
+def blended(over: str, below: str, share: float) -> str:
+    """Return the colour of `over` with the opacity `share` on `below`."""
+    parts = (
+        round(int(over[at : at + 2], 16) * share + int(below[at : at + 2], 16) * (1 - share))
+        for at in (1, 3, 5)
+    )
+    return "#" + "".join(f"{part:02x}" for part in parts)
+
+
+@pytest.mark.parametrize("theme", THEMES)
+def test_old_values_can_be_read_on_the_lines_of_their_hatching(theme: str) -> None:
+    """Text 4.5:1 also where a letter lies on a line; an old value has the colour of muted text."""
+    css = (STATIC / "live/lost.css").read_text("utf-8")
+    share = int(re.findall(r"color-mix\(in srgb, var\(--urc-line\) (\d+)%", css)[0]) / 100
+    colours = theme_colours(theme)
+    names = ["text", "alarm", "caution", *([] if theme == "night" else ["muted"])]
+    line = luminance(blended(colours["line"], colours["surface"], share))
+    for name in names:
+        bright, dark = sorted((luminance(colours[name]), line), reverse=True)
+        assert (bright + 0.05) / (dark + 0.05) >= 4.5, name

@@ -34,12 +34,19 @@ DRIVES: Mapping[str, tuple[str, Mapping[str, object]]] = {
     "roveo-mini": ("drive", {"forward": 60, "left": 30}),
     "salamandra-i": ("swim", {"drive": 1.0}),
     "salamandra-ii": ("swim", {"drive": 1.0}),
+    "spot": ("drive", {"speed": 0.3, "turn": 0.3}),
     "tello": ("fly", {"forward": 50, "clockwise": -40}),
     "turtlebot3": ("drive", {"speed": 0.2, "turn": 0.3}),
     "turtlebot4": ("drive", {"speed": 0.2, "turn": 0.3}),
 }
 """Ahead, and to the left."""
-STOPS_AFTER_S = {"absolem": 1.0, "turtlebot4": 0.5, "ardupilot-rover": 3.0, "tello": 15.0}
+STOPS_AFTER_S = {
+    "absolem": 1.0,
+    "ardupilot-rover": 3.0,
+    "spot": 0.5,
+    "tello": 15.0,
+    "turtlebot4": 0.5,
+}
 """What the robots themselves do when commands stop, as their pages say; all others go on."""
 
 
@@ -122,14 +129,14 @@ def test_when_commands_stop_it_does_what_the_real_one_does(name: str) -> None:
 
 
 def test_every_robot_that_moves_or_senses_has_a_world() -> None:
-    """All but the arm and the toy of the tutorial."""
+    """All but the arms and the toy of the tutorial; see `test_arm`."""
     files = list(FOLDER.glob("*.yaml"))
     without = {file.stem for file in files if profile_of(file).world is None}
-    assert without == {"puppet", "ur-e-series"}
+    assert without == {"puppet", "ur-e-series", "ur-ros2"}
     assert {*DRIVES} == {file.stem for file in files} - without - {"esp32-cam", "gpsd", "nmea-gps"}
 
 
-@pytest.mark.parametrize("name", ["generic-ros2", "turtlebot4"])
+@pytest.mark.parametrize("name", ["generic-ros2", "turtlebot3", "turtlebot4"])
 def test_it_drives_to_a_goal_stops_when_it_is_cancelled_and_refuses_others(name: str) -> None:
     """With Nav2: the map, the plan and the place on the map come from the same world."""
     talk = Conversation(profile_of(FOLDER / f"{name}.yaml"))

@@ -9,6 +9,7 @@ from playwright.async_api import Page
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
+from tests.e2e.motion.driving import CALM_LEASE_S, USES, commands
 from urc.model.interface import WidgetUse
 from urc.model.values import AlarmAttributes, AlarmLimits, Signal
 from urc.runtime.alarm_table import AlarmQuery, search_alarms
@@ -27,7 +28,7 @@ MODE = Signal(
 )  # fmt: skip
 COUNT = 200
 WATCH = """() => {
-  window.seen = { tones: 0, said: [], longest: 0, flips: 0, titles: new Set(), messages: 0 };
+  window.seen = { tones: 0, said: [], longest: 0, flips: 0, shifted: [] };
   const real = OscillatorNode.prototype.start;
   OscillatorNode.prototype.start = function (...args) {
     seen.tones += 1;
@@ -37,6 +38,13 @@ WATCH = """() => {
   new MutationObserver(() => seen.said.push(said.textContent)).observe(said, { childList: true });
   const strip = document.querySelector('[data-alarm-strip]');
   new MutationObserver(() => { seen.flips += 1; }).observe(strip, { attributeFilter: ['hidden'] });
+  new PerformanceObserver((list) => {
+    for (const { node } of list.getEntries().flatMap(({ sources }) => sources)) {
+      const moved = node instanceof Element ? node : node?.parentElement;
+      const isExpected = moved?.closest(".alerts, [data-alarm-strip]");
+      if (moved && !isExpected) seen.shifted.push(moved.outerHTML);
+    }
+  }).observe({ type: "layout-shift" });
   let last = performance.now();
   const frame = (now) => {
     seen.longest = Math.max(seen.longest, now - last);
@@ -48,8 +56,11 @@ WATCH = """() => {
 
 
 def robot_of(*signals: Signal) -> FakeRobot:
+    """Return a robot with sticks and a list of alarms."""
     profile = dashboard_profile(
-        uses=[WidgetUse("alerts", "alerts")], signals={one.name: one for one in signals}
+        uses=[*USES, WidgetUse("alerts", "alerts")],
+        signals={one.name: one for one in signals},
+        commands=commands(CALM_LEASE_S),
     )
     return FakeRobot(profile)
 
@@ -75,7 +86,7 @@ async def test_a_strip_shows_the_worst_alarm_and_is_gone_with_it(new_page: PageM
         robot.set_reading("battery", 15, alarm="low")
         await until_text(page, "[data-alarm-strip] .urc-alarm-line", "Battery: Low, 15 %")
         await until_text(page, "[data-alarm-strip] .urc-alarm-action", "Dock now.")
-        await until_text(page, "[data-alarm-strip] .urc-alarm-more", "+1")
+        await until_text(page, "[data-alarm-strip] .urc-alarm-more", "1 more alarm")
         assert await page.title() == f"▲ 2 · {title}"
         assert await strip.get_attribute("data-priority") == "high"
         assert await strip.get_attribute("data-flash") == "true"
@@ -148,12 +159,13 @@ async def test_200_alarms_in_10_s_stay_quiet_and_none_is_lost(
         for at in range(COUNT):
             robot.set_reading(f"s{at}", 2, alarm="high")
             await asyncio.sleep(max(0.0, began + (at + 1) * 10 / COUNT - loop.time()))
-        await until_text(page, ".alerts-note", f"{COUNT} not acknowledged · +150 more")
+        await until_text(page, ".alerts-note", f"{COUNT} not acknowledged · 150 more")
         seen: dict[str, Any] = await page.evaluate("() => ({ ...seen })")
         assert seen["tones"] <= 3, seen
         assert len(seen["said"]) <= 6, seen
         assert seen["flips"] == 1, "the strip comes once, and stays"
         assert seen["longest"] < 500, seen
+        assert seen["shifted"] == [], "sticks and other widgets stay where they are"
         assert await page.title() == f"▲ {COUNT} · Puppet · URC"
         await page.click("[data-alarm-open]")
         bursts = page.locator("[data-alarm-list] > li")
@@ -163,7 +175,7 @@ async def test_200_alarms_in_10_s_stay_quiet_and_none_is_lost(
         grouped = sum(int(text.split()[0]) if "burst" in text else 1 for text in texts)
         assert grouped == COUNT, "every alarm is in one group"
         await page.click("[data-key=all]")
-        await until_text(page, ".alerts-note", "0 not acknowledged · +150 more")
+        await until_text(page, ".alerts-note", "0 not acknowledged · 150 more")
         answer = await page.request.get(f"{address}api/v1/robots/puppet/alarms")
         listed = await answer.json()
         assert listed["flood"]

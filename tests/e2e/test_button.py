@@ -322,7 +322,8 @@ AFFORDANCE = """() => {
     isClear: words.bottom <= track.top + 2 && said.bottom <= track.top + 2,
     width: track.width / frame.width, height: track.height,
     isMarked: document.querySelector(".button-end").checkVisibility(),
-    hatch: getComputedStyle(document.querySelector(".button-track")).backgroundImage,
+    hatch: getComputedStyle(main).backgroundImage,
+    isOffEnds: words.left >= frame.left + 6 && words.right <= frame.right - 6,
   };
 }"""
 
@@ -332,7 +333,7 @@ AFFORDANCE = """() => {
 async def test_the_button_of_a_hazard_has_a_track_at_every_size(
     new_page: PageMaker, size: tuple[int, int], cells: int
 ) -> None:
-    """With a hazard mark at its end; a note makes it thin, and covers neither it nor the label."""
+    """With a hazard mark, between hatched ends; a note makes it thin, and covers no other part."""
     hazard = Confirm(level="hazardous", text="The drone will fall.")
     cut = Command("cut", "wire", WriteSpec("text", {}), confirm=hazard)
     signals = {"at": Signal("at"), "eye": Signal("eye", "image")}
@@ -357,6 +358,7 @@ async def test_the_button_of_a_hazard_has_a_track_at_every_size(
         assert seen["width"] > 0.8
         assert seen["height"] >= 12
         assert "repeating-linear-gradient" in seen["hatch"]
+        assert seen["isOffEnds"]
         await page.evaluate(
             "document.querySelector('.button-note').textContent = '▲ refused: not in the air'"
         )

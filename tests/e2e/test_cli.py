@@ -67,11 +67,11 @@ def test_watch_follows_a_robot_that_dies_and_comes_back(urc_process: Start) -> N
     watch = urc_process("watch", PUPPET, "battery", "--set", port)
     watch.wait_for('"battery"')
     robot.kill()
-    watch.wait_for(r"^warning: wire: lost: nothing listens")
+    watch.wait_for(r"^warning: transport wire: lost: nothing listens")
     before = len(watch.output)
     urc_process("simulate", PUPPET, "--set", port).wait_for("listening")
     watch.wait_for('"battery"', times=before + 1)
-    watch.wait_for(r"^info: wire: live$", times=2)
+    watch.wait_for(r"^info: transport wire: live$", times=2)
     assert watch.interrupt() == 130
     assert not [line for line in watch.errors if "Traceback" in line]
 
@@ -207,7 +207,9 @@ def test_simulated_robot_tells_what_it_cannot_answer(urc_process: Start) -> None
             client.sendall(b"Give me the batery %\nGive me the battery %\n")
             assert re.fullmatch(rb"\d{1,2}\n", client.recv(100))
     assert robot.interrupt() == 0
-    complaint = "wire: no rule matches 'Give me the batery %', and the driver never sends it"
+    complaint = (
+        "transport wire: no rule matches 'Give me the batery %', and the driver never sends it"
+    )
     assert robot.errors == [complaint, f"{complaint} (2 more times)"]
 
 

@@ -1,18 +1,27 @@
 """A page with little room: low screens, large text, and questions in the lowest cells."""
 
 import pytest
-from playwright.async_api import expect
+from playwright.async_api import Page, expect
 
 from tests.e2e.browser import running_browser
 from tests.e2e.conftest import PageMaker
-from tests.e2e.dashboards import running_dashboard, turned, until, until_attribute
+from tests.e2e.dashboards import is_on_top, running_dashboard, turned, until, until_attribute
 from tests.e2e.keys import known_here
-from tests.e2e.motion.driving import CALM_LEASE_S, driven, held, number
+from tests.e2e.motion.driving import (
+    CALM_LEASE_S,
+    USES,
+    Wire,
+    commands,
+    driven,
+    held,
+    number,
+    push,
+)
 from urc.model.driver import Command
 from urc.model.exchange import Confirm
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.payload import WriteSpec
-from urc.model.values import Signal
+from urc.model.values import AlarmAttributes, AlarmLimits, Signal
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -145,3 +154,67 @@ async def test_a_question_is_whole_in_the_lowest_cells(new_page: PageMaker) -> N
             assert high <= seen, name
             assert 0 <= top < bottom <= 844, name
             await question.get_by_role("button", name="Cancel").click()
+
+
+HEIGHTS = """() => [...document.querySelectorAll(".urc-cell:not([data-place='ground'])")].map(
+    (el) => Math.round(el.getBoundingClientRect().height))"""
+STILL = """() => [...document.querySelectorAll("[data-stop-button], .joystick-face, .urc-cell")]
+    .map((el) => el.getBoundingClientRect()).map(({ x, y }) => [Math.round(x), Math.round(y)])"""
+
+
+async def test_displays_make_way_on_a_low_phone_while_a_stick_is_held(new_page: PageMaker) -> None:
+    """They become as low as values; an alarm covers neither them nor the background's buttons."""
+    robot = Wire(lease_s=CALM_LEASE_S)
+    low = AlarmLimits(low=20, attributes=(("low", AlarmAttributes("high", "", "Dock it.")),))
+    signals = {
+        **{name: Signal(name, "image", title=name.title()) for name in ("front", "side", "rear")},
+        "charge": Signal("charge", unit="%", stale_after_s=60, limits=low),
+        "course": Signal("course", unit="deg", stale_after_s=60),
+    }
+    uses = [
+        USES[0],
+        WidgetUse("front", "camera", lists={"images": ("front", "side")}),
+        WidgetUse("rear", "camera", {"image": "rear"}),
+        WidgetUse("charge", "value", {"value": "charge"}),
+        WidgetUse("course", "compass", {"heading": "course"}),
+    ]
+    slots = (Slot("charge", 0, 0), Slot("course", 0, 2), Slot("rear", 0, 3), Slot("left", 0, 4, 2))
+    interface = Interface("x", "X", {"landscape": Layout(2, 5, slots)}, background="front")
+    profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))
+    robot.profile = profile._replace(interfaces={"x": interface})
+    async with driven(robot=robot) as (_, address):
+        page = await new_page()
+        await turned(page, (844, 390))
+        await page.goto(address)
+        await expect(page.locator(".joystick")).to_have_attribute("data-phase", "idle")
+        free, places = await page.evaluate(HEIGHTS), await page.evaluate(STILL)
+        assert sum(height > 100 for height in free) == 3, free
+        await push(page, ".joystick-pad")
+        await robot.until_moving()
+        assert await page.evaluate(STILL) == places
+        held_heights = await page.evaluate(HEIGHTS)
+        assert sorted(held_heights)[:3] == [58, 58, 58], held_heights
+        robot.set_reading("charge", 10, alarm="low")
+        await page.locator("[data-alarm-strip]").wait_for()
+        await until_uncovered(page)
+        await page.mouse.up()
+        await robot.until_stopped()
+        assert await page.evaluate(HEIGHTS) == free
+
+
+async def until_uncovered(page: Page) -> None:
+    """Wait until the strip of an alarm, which is on top, covers no display and no button."""
+    for name in ("Front", "Side"):
+        await expect(page.get_by_role("button", name=name, exact=True)).to_be_visible()
+    await page.wait_for_function(UNCOVERED)
+    assert await is_on_top(page, "[data-alarm-seen]")
+
+
+UNCOVERED = """() => {
+  const strip = document.querySelector("[data-alarm-strip]").getBoundingClientRect();
+  const shown = [...document.querySelectorAll(
+    ".urc-pip, [data-footprint='instrument'], [data-place='ground'] .urc-view-button")]
+    .filter((el) => el.checkVisibility()).map((el) => el.getBoundingClientRect());
+  return shown.length >= 4 && shown.every(({ left, top, right, bottom }) =>
+    bottom <= strip.top || top >= strip.bottom || right <= strip.left || left >= strip.right);
+}"""

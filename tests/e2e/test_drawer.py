@@ -21,6 +21,7 @@ from tests.e2e.motion.driving import (
 )
 from urc.model.interface import Interface, Layout, Slot, WidgetUse
 from urc.model.values import Signal
+from urc.runtime.running_goals import RunningGoal
 from urc.testing.dashboard import dashboard_profile
 
 pytestmark = pytest.mark.anyio
@@ -85,6 +86,7 @@ async def test_what_has_no_place_is_in_a_drawer_and_only_on_a_low_screen(
         page = await lying(new_page, address)
         await expect(page.locator("[data-rest]")).to_be_hidden()
         await expect(page.locator(LIFT)).to_be_hidden()
+        await expect(page.locator(HANDLE)).to_have_text("Lift, Winch")
         await page.locator(HANDLE).click()
         drawer = page.get_by_role("group", name="More controls")
         await expect(drawer.locator(LIFT)).to_contain_text("Lift")
@@ -176,10 +178,10 @@ async def test_stop_works_over_an_open_drawer(new_page: PageMaker, how: str) -> 
         if how == "its button":
             await page.locator(STOP).click()
         elif how == "Escape while the robot moves by itself":
-            with robot.hub.moved_by("goal"):  # sent by any screen
-                await asyncio.sleep(0.5)
-                await page.keyboard.press("Escape")
-                await until(lambda: len(robot.latched) == 1)
+            robot.hub.begin_goal(RunningGoal(0, "goal"))  # sent by any screen
+            await asyncio.sleep(0.5)
+            await page.keyboard.press("Escape")
+            await until(lambda: len(robot.latched) == 1)
         else:
             x, y = await centre(page, f"{STICK} >> nth=0")
             await page.mouse.move(x, y)

@@ -13,6 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import httpx2
+import jsonschema
 import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
@@ -160,6 +161,75 @@ def test_a_held_command_is_no_service_and_stop_is_one_for_everybody(server: ApiS
         reset = {"verb": "reset"}
         lease = api.post("api/v1/robots/cart/lease", json=reset, headers=headers)
         assert lease.json()["latched"] == ""
+
+
+MAPPER = """\
+urc: 1
+kind: robot
+name: mapper
+title: Mapper
+settings: { port: { type: port, default: 9090 } }
+transports:
+  ros: { type: ros, host: 127.0.0.1, port: "{{ settings.port }}", version: 2, stale_after: 3s }
+signals:
+  frames: { type: transform_tree, stale_after: 2s }
+messages:
+  transforms:
+    subscribe: { topic: /tf, type: tf2_msgs/TFMessage, throttle: 200ms }
+    json: { frames: "@" }
+simulator:
+  ros:
+    - every: 200ms
+      send:
+        publish:
+          topic: /tf
+          type: tf2_msgs/TFMessage
+          json:
+            transforms:
+              - header: { frame_id: map }
+                child_frame_id: odom
+                transform:
+                  translation: { x: 2.5, y: -1, z: 0 }
+                  rotation: { x: 0, y: 0, z: 0, w: 1 }
+              - header: { frame_id: odom }
+                child_frame_id: base
+                transform:
+                  translation: { x: 0, y: 0, z: 0.5 }
+                  rotation: { x: 0, y: 0, z: 1, w: 0 }
+"""
+
+
+@pytest.mark.needs("node")
+@pytest.mark.needs("ws-protocol")
+def test_foxglove_gets_the_transforms_of_a_ros_robot(tmp_path: Path) -> None:
+    processes: list[UrcProcess] = []
+
+    def start(*arguments: str) -> UrcProcess:
+        processes.append(UrcProcess(arguments, {}))
+        return processes[-1]
+
+    try:
+        mapper = started(start, tmp_path, robots={"mapper": MAPPER})
+        _, token = mapper.token("watch")
+        with Viewer(address(mapper, token), SDK) as viewer:
+            while "/mapper/urc/transforms" not in viewer.channels:
+                viewer.next()
+            channel = viewer.channels["/mapper/urc/transforms"]
+            assert channel["schemaName"] == "foxglove.FrameTransforms"
+            number = viewer.subscribe("/mapper/urc/transforms")
+            message = viewer.until("message", subscription=number)["value"]
+            jsonschema.validate(message, json.loads(channel["schema"]))
+            names = [
+                (one["parent_frame_id"], one["child_frame_id"]) for one in message["transforms"]
+            ]
+            assert names == [("mapper/map", "mapper/odom"), ("mapper/odom", "mapper/base")]
+            first, second = message["transforms"]
+            assert first["translation"] == {"x": 2.5, "y": -1, "z": 0}
+            assert second["rotation"] == {"x": 0, "y": 0, "z": 1, "w": 0}
+            assert abs(first["timestamp"]["sec"] - time.time()) < SOON_S
+    finally:
+        for process in processes:
+            process.kill()
 
 
 # ---- who may connect

@@ -119,23 +119,33 @@ async def test_the_left_hand_is_kept_on_the_device(new_page: PageMaker) -> None:
         assert (await box(page, C))["x"] < (await box(page, A))["x"]
 
 
-async def test_only_a_tab_that_is_not_drawn_for_a_phone_asks_to_turn_it(
+async def test_only_the_first_visit_asks_to_turn_a_phone_whose_slots_are_stacked(
     new_page: PageMaker,
 ) -> None:
-    """The hint comes and goes with the tabs."""
+    """Never in landscape, nor for an interface that is drawn for a phone in portrait."""
+    ask = "Turn the phone for the full layout."
     wide = row("a", "b", "c")
-    tabs = {
-        "one": Tab("one", "One", {"landscape": wide}),
-        "two": Tab("two", "Two", {"landscape": wide, "phone_portrait": row("a", "b")}),
-    }
-    async with running_dashboard(gauged(Interface("x", "X", tabs=tabs))) as address:
-        page = await new_page(size="phone")
+    async with running_dashboard(gauged(Interface("x", "X", {"landscape": wide}))) as address:
+        page = await new_page(size="phone", is_first=True)
+        hints = page.get_by_role("region", name="Hints")
         await page.goto(f"{address}robots/puppet/")
-        await expect(page.locator("[data-turn]")).to_be_visible()
-        await page.get_by_role("tab", name="Two").click()
-        await expect(page.locator("[data-turn]")).to_be_hidden()
-        await page.get_by_role("tab", name="One").click()
-        await expect(page.locator("[data-turn]")).to_be_visible()
+        await expect(hints).to_contain_text(ask)
+        await page.set_viewport_size({"width": 844, "height": 390})
+        await page.reload()
+        await expect(hints).to_be_visible()
+        await expect(hints).not_to_contain_text(ask)
+        await page.set_viewport_size({"width": 390, "height": 844})
+        await page.get_by_role("button", name="Got it").click()
+        await page.reload()
+        await expect(page.locator(".urc-cell").first).to_be_visible()
+        await expect(page.locator("body")).not_to_contain_text(ask)
+    drawn = Interface("x", "X", {"landscape": wide, "phone_portrait": column("a", "b")})
+    async with running_dashboard(gauged(drawn)) as address:
+        page = await new_page(size="phone", is_first=True)
+        hints = page.get_by_role("region", name="Hints")
+        await page.goto(f"{address}robots/puppet/")
+        await expect(hints).to_be_visible()
+        await expect(hints).not_to_contain_text(ask)
 
 
 async def test_a_tab_hides_what_it_does_not_show(new_page: PageMaker) -> None:

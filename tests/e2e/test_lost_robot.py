@@ -78,7 +78,7 @@ GROUND_CELL = "[data-place='ground']"
 OF_PICTURE = """() => {
   const canvas = document.querySelector(".camera-picture");
   const { visibility, filter } = getComputedStyle(canvas);
-  const hatch = getComputedStyle(canvas.closest(".urc-cell"), "::before").backgroundImage;
+  const hatch = getComputedStyle(canvas.closest(".urc-view"), "::after").backgroundImage;
   return { visibility, filter, hatch, width: canvas.width };
 }"""
 
@@ -214,11 +214,15 @@ class UninstalledRobot(FakeRobot):
 
 async def test_a_robot_whose_extra_is_missing_is_not_a_lost_server(new_page: PageMaker) -> None:
     """The card has the whole command, however long it is."""
-    async with running_dashboard(UninstalledRobot(dashboard_profile())) as address:
+    uses = [WidgetUse("link", "link"), WidgetUse("alerts", "alerts")]
+    async with running_dashboard(UninstalledRobot(dashboard_profile(uses=uses))) as address:
         page = await new_page(size="phone")
         await page.goto(f"{address}robots/puppet/")
         await expect(page.locator(CARD)).to_contain_text("Cannot open Puppet")
         await expect(page.locator(CARD)).to_contain_text(PACKAGE)
         await expect(page.locator(CARD)).to_contain_text("Install it, then start URC again.")
         await expect(page.locator("[data-badge-text]")).to_have_text("Cannot open")
-        await expect(page.locator("body")).not_to_contain_text("to URC", use_inner_text=True)
+        await expect(page.locator(".link-now")).to_have_text("▲ Cannot open")
+        await expect(page.locator(".alerts-note")).to_contain_text("not connected to the robot")
+        lost_server = re.compile("connect(ion|ed) to URC", re.IGNORECASE)
+        await expect(page.locator("body")).not_to_contain_text(lost_server, use_inner_text=True)

@@ -1,5 +1,6 @@
 """The use cases B.5.1 to B.5.8 of the thesis in a real browser, with the repository on and off."""
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -261,9 +262,16 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         camera = page.locator("[data-field='camera']")
         await expect(camera.get_by_placeholder("Default: 127.0.0.1")).to_have_value("")
         await expect(camera.locator(".urc-default")).to_be_hidden()
+        test = page.get_by_role("button", name="Test connection")
+        save = page.get_by_role("button", name="Save without testing")
+        await expect(test).to_be_enabled()
+        await expect(save).to_be_disabled()
         await camera.locator("input").fill("127.0.0.2")
+        await expect(test).to_have_count(0)
+        await expect(save).to_be_enabled()
         await expect(camera.locator(".urc-default")).to_have_text("Default: 127.0.0.1")
         await camera.locator("input").fill("")
+        await expect(save).to_be_disabled()
         await page.get_by_label("Robot address").fill("127.0.0.1")
         await page.get_by_label("Port").fill("1")
         await page.get_by_label("Key").fill("open sesame")
@@ -287,6 +295,8 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await page.get_by_role("button", name="Test & save").click()
         await expect(wire).to_have_attribute("data-verdict", "answers")
         await expect(page.locator("[data-said]")).to_have_text("✓ Saved and in use")
+        await expect(test).to_be_enabled()
+        await expect(save).to_be_disabled()
         told = page.locator("[data-field='host'] [data-fault]")
         await expect(told).to_contain_text("answers")
         await page.get_by_label("Robot address").press("End")
@@ -302,6 +312,54 @@ async def test_connect_to_a_robot_and_disconnect(new_page: PageMaker, has: dict[
         await page.get_by_role("link", name="Back: disconnect").click()
         await expect(page.get_by_role("link", name="Connect to Rover")).to_be_visible()
         await until(lambda: heard[-1:] == [GONE])
+
+
+TWO_TRANSPORTS = """\
+urc: 1
+kind: robot
+name: pair
+settings:
+  host: { type: host, default: 127.0.0.1, title: Robot address }
+  port: { type: port, title: Port }
+transports:
+  arm: { type: tcp, host: "{{ settings.host }}", port: "{{ settings.port }}", framing: LF }
+  base: { type: tcp, host: "{{ settings.host }}", port: OTHER, framing: LF }
+signals: { charge: { type: integer }, load: { type: integer } }
+polls:
+  - { every: 1s, to: arm, send: "charge?", reply: { regex: '^(?P<charge>[0-9]+)$' } }
+  - { every: 1s, to: base, send: "load?", reply: { regex: '^(?P<load>[0-9]+)$' } }
+""".replace("LF", "{ type: delimiter, rx: LF, tx: LF }")
+
+
+async def test_each_transport_of_a_tested_address_is_named(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """A failure comes first; it does not hide that the other transport answers."""
+    robot = tmp_path / "pair.yaml"
+    async with emulated_rover([]) as port, emulated_rover([]) as other:
+        robot.write_text(TWO_TRANSPORTS.replace("OTHER", str(other)), encoding="utf-8")
+        profile = open_document(robot)
+        async with running_managed(tmp_path / "data", [profile]) as address:
+            page = await new_page()
+            await page.goto(f"{address}robots/pair/settings")
+            told = page.locator("[data-field='host'] [data-fault] > *")
+            await page.get_by_label("Port").fill(str(port))
+            await page.get_by_role("button", name="Test & save").click()
+            await expect(told).to_have_text(["● arm: answers", "● base: answers"])
+    robot.write_text(TWO_TRANSPORTS.replace("OTHER", "1"), encoding="utf-8")
+    profile = open_document(robot)
+    async with (
+        emulated_rover([]) as port,
+        running_managed(tmp_path / "more", [profile]) as address,
+    ):
+        page = await new_page()
+        await page.goto(f"{address}robots/pair/settings")
+        await page.get_by_label("Port").fill(str(port))
+        await page.get_by_role("button", name="Test & save").click()
+        told = page.locator("[data-field='host'] [data-fault] > *")
+        await expect(told).to_have_text(
+            [re.compile(r"^▲ base: 127\.0\.0\.1:1 refuses"), "● arm: answers"]
+        )
 
 
 async def test_the_dev_interface(new_page: PageMaker, tmp_path: Path) -> None:

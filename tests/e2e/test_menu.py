@@ -73,7 +73,7 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         assert await menu.title() == "▲ 1 · URC"
         await menu.get_by_role("button", name="Alarms 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
-        await menu.get_by_role("button", name="On 1").click()
+        await menu.get_by_role("button", name="Connected 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
         await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
@@ -143,7 +143,7 @@ async def test_a_filter_is_kept_on_the_way_back(new_page: PageMaker) -> None:
     async with running_dashboard(*fleet(8)) as address:
         page = await new_page()
         await page.goto(address)
-        await page.get_by_role("button", name="On 0").click()
+        await page.get_by_role("button", name="Connected 0").click()
         await expect(page.get_by_text("No robot fits.")).to_be_visible()
         await page.reload()
         await expect(page.get_by_text("No robot fits.")).to_be_visible()

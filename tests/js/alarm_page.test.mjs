@@ -65,7 +65,7 @@ test("the strip is there with an alarm only, and shows the worst one with its ac
   assert.equal(strip.hidden, false);
   assert.deepEqual(texts(strip, ".urc-alarm-line"), ["Signal 2: High, 9"]);
   assert.deepEqual(texts(strip, ".urc-alarm-action"), ["Dock now."]);
-  assert.deepEqual(texts(strip, ".urc-alarm-more"), ["+1"]);
+  assert.deepEqual(texts(strip, ".urc-alarm-more"), ["1 more alarm"]);
   assert.deepEqual([strip.getAttribute("data-priority"), strip.getAttribute("data-flash"), document.title], ["high", "true", "▲ 2 · Rover"]);
   page.take({ ...message([row(2, { state: "acknowledged" }), row(1, { priority: "medium", state: "acknowledged" })]), full: false });
   page.frame(0);

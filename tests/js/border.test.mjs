@@ -93,7 +93,7 @@ test("a widget is told of what it is bound to, without addresses", () => {
   const bound = { signals: new Set(["a"]), commands: new Set(["go"]) };
   const link = { transport: "wire", state: "live", address: "tcp 10.0.0.1:22", detail: "root@x" };
   assert.deepEqual(tellable("links", { isUp: true, links: [link] }, bound), {
-    isUp: true, isReplay: false, links: [{ transport: "wire", state: "live", address: "", detail: "" }],
+    isUp: true, isRefused: false, isReplay: false, links: [{ transport: "wire", state: "live", address: "", detail: "" }],
   });
   const alarms = [{ signal: "a" }, { signal: "b" }];
   assert.deepEqual(tellable("alarms", alarms, bound), [{ signal: "a" }]);

@@ -5,7 +5,7 @@ import { colour, palette, pixel } from "../../urc/web/static/widgets/colour_map.
 import { Rate, ageText, fileName, lookOf, place } from "../../widgets/camera/frame.js";
 import { arrayField, paint, pixelAt, probe, rawField, readField } from "../../widgets/depth/field.js";
 import {
-  Trail, bearingOf, distance, gridStep, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
+  Trail, bearingOf, distance, gridStep, headingText, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
 } from "../../widgets/map/geo.js";
 import { bearing, crop, firstView, poseOf, target, tilted, turned } from "../../widgets/pano360/look.js";
 import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "../../widgets/range/sight.js";
@@ -221,9 +221,28 @@ test("a fix says place and accuracy, and nothing while it has none", () => {
 
 test("a trail keeps so many places, and none close to the one before", () => {
   const trail = new Trail(3, 1, true);
-  const added = [[0, 0], [0, 0.5], [0, 1], [0, 2], [0, 3]].map(([y, x]) => trail.add([y ?? 0, x ?? 0]));
+  const added = [[0, 0], [0, 0.5], [0, 1], [0, 2], [0, 3]].map(([y, x], second) => trail.add([y ?? 0, x ?? 0], 1000 * second));
   assert.deepEqual(added, [true, false, true, true, true]);
   assert.deepEqual(trail.places, [[0, 1], [0, 2], [0, 3]]);
+  trail.clear();
+  assert.deepEqual(trail.places, [[0, 3]]);
+});
+
+test("a jump of the robot's position starts a new trail, a fast robot does not", () => {
+  const trail = new Trail(1000, 0.2, true);
+  for (const [x, ms] of [[0, 0], [1, 100], [2, 200], [2.1, 300]]) trail.add([0, x ?? 0], ms ?? 0);
+  assert.equal(trail.places.length, 3);
+  trail.add([5, 2.1], 400); // 50 m/s: its localisation was reset
+  assert.deepEqual(trail.places, [[5, 2.1]]);
+  trail.add([5, 30], 60_000); // a minute without a value
+  assert.equal(trail.places.length, 2);
+  const flown = new Trail(1000, 0.2, false);
+  for (const [north, ms] of [[0, 0], [0.001, 1000], [0.01, 2000]]) flown.add([46 + (north ?? 0), 6], ms ?? 0);
+  assert.deepEqual(flown.places, [[46.01, 6]]); // 111 m/s, and then 1 km/s
+});
+
+test("a bearing has three figures", () => {
+  assert.deepEqual([7.4, 359.6, -90, 113].map(headingText), ["007°", "000°", "270°", "113°"]);
 });
 
 test("a picture fits its box whichever way it is turned", () => {

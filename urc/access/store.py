@@ -115,8 +115,12 @@ class AccessStore:
             self._base = sqlite3.connect(
                 self.file, timeout=_BUSY_S, isolation_level=None, check_same_thread=False
             )
-            self._prepare()
-            self._seen = self._version()
+            try:
+                self._prepare()
+                self._seen = self._version()
+            except BaseException:
+                self._base.close()
+                raise
         except (OSError, sqlite3.Error) as error:
             raise AccessError(f"{self.file}: cannot be used: {error}") from None
 
@@ -220,6 +224,10 @@ class AccessStore:
         self._update(
             "UPDATE principals SET grants = ? WHERE id = ?", grants_to_json(grants), principal
         )
+
+    def set_end(self, principal: str, ends_at: float) -> None:
+        """Set the UTC end of a principal's rights; raise `AccessError` if it is unknown."""
+        self._update("UPDATE principals SET ends_at = ? WHERE id = ?", ends_at, principal)
 
     def remove(self, principal: str) -> None:
         """Remove a principal with its sign-ins, credentials and devices.

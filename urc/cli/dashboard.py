@@ -25,7 +25,7 @@ from urc.problems import UrcError
 from urc.runtime.audit import FILE, AuditLog
 from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
-from urc.runtime.missing_packages import missing_package
+from urc.runtime.missing_packages import missing_packages
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.server_recorder import NO_ACTOR, ServerRecorder
 from urc.runtime.session import Motion, Session
@@ -39,6 +39,7 @@ from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 from urc.web.foxglove.port import FoxglovePort
 from urc.web.people.ways_in import SignInOptions
+from urc.web.serve.access import Access
 from urc.web.serve.clock_check import clock_warning
 from urc.web.serve.service_manager import ServiceManager, answers
 
@@ -129,6 +130,15 @@ def run_dashboard(
     return run_loop(work, code_when_ended=0, is_fast=True)
 
 
+def _opened_access(stack: AsyncExitStack, data: Path, place: DashboardAddress) -> Access:
+    """Return the identities of people, whose store the stack closes."""
+    access = access_for(data, is_open=place.is_open)
+    if access.control.store is not None:
+        stack.callback(access.control.store.close)
+    access.clock_check = partial(clock_warning, data)
+    return access
+
+
 async def _serve(
     profiles: Sequence[Profile],
     place: DashboardAddress,
@@ -143,8 +153,7 @@ async def _serve(
         robot_options = robot_options_of(place, given, faulty)
         data = robot_options.data
         await _warn_of(data)
-        access = access_for(data, is_open=place.is_open)
-        access.clock_check = partial(clock_warning, data)
+        access = _opened_access(stack, data, place)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
 
         foxglove = FoxglovePort(place.foxglove) if place.foxglove is not None else None
@@ -191,10 +200,10 @@ async def _serve(
     return 0
 
 
-def _warn_of_package(robot: Robot) -> None:
+def _warn_of_packages(robot: Robot) -> None:
     """Report a robot that no page can open, because an extra is not installed."""
-    text = missing_package(robot.profile, robot.settings, built_in_catalog().transports)
-    if text:
+    transports = built_in_catalog().transports
+    for text in missing_packages(robot.profile, robot.settings, transports):
         complain(f"urc: {robot.profile.name} cannot be opened: {text}")
 
 
@@ -241,7 +250,7 @@ async def _robot_at_start(
 ) -> Robot:
     """Return a profile's robot; with `faulty`, emulate the robot even before a page opens."""
     robot = _first(factory, profile)
-    _warn_of_package(robot)
+    _warn_of_packages(robot)
     if faulty is None:
         return robot
     emulated_robot = EmulatedRobot(robot.profile, robot.settings)

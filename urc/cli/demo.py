@@ -7,12 +7,11 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 
 from urc.cli.arguments import add_dev, add_host, add_port, is_loopback
 from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
-from urc.cli.output import complain
 from urc.cli.progress import Progress
 from urc.cli.start_addresses import ReadyDashboard
 from urc.cli.tls_options import add_tls, tls_of
@@ -38,13 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--phone",
         action="store_true",
-        help="accept devices on this network, and print a QR code that pairs one of them",
+        help="accept devices on this network, and print a QR code that pairs one of them until the"
+        " demo ends",
     )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Serve the demo until Ctrl-C or SIGTERM."""
     from urc.cli.dashboard import DashboardAddress, run_dashboard
+    from urc.cli.demo_phone import paired_until_end
     from urc.config.load import load_profile
     from urc.runtime.registries import built_in_catalog
 
@@ -69,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
         first, *others = ready_dashboard.lines()
         print("\n".join((f"{first}   (Ctrl-C ends it)", *others)), flush=True)
         if arguments.phone:
-            _invite_phone(ready_dashboard.others)
+            stack.enter_context(paired_until_end(ready_dashboard.others))
         elif sys.stdout.isatty() and is_loopback(arguments.host):
             print("on a phone: 'urc demo --phone' prints a QR code", flush=True)
         if not arguments.no_browser and has_screen(sys.platform, os.environ):
@@ -77,24 +78,15 @@ def run(arguments: argparse.Namespace) -> int:
             url = ready_dashboard.address_once
             threading.Thread(target=_open_browser, args=(url,), daemon=True).start()
 
-    return run_dashboard(
-        profiles,
-        DashboardAddress(arguments.host, _port(arguments), tls=tls_of(arguments)),
-        is_simulated=True,
-        on_ready=announce,
-        is_dev=arguments.dev,
-        faults=arguments.faults,
-    )
-
-
-def _invite_phone(address: str) -> None:
-    """Print a link and a QR code for pairing one device with the role ``drive``."""
-    from urc.cli.devices import invite_device
-    from urc.cli.identities import opened, roles_in
-
-    with opened(None) as store:
-        invite_device(store, address.rstrip("/"), roles_in(["drive"]))
-    complain("to pair another device, run 'urc devices pair' in a second terminal")
+    with ExitStack() as stack:
+        return run_dashboard(
+            profiles,
+            DashboardAddress(arguments.host, _port(arguments), tls=tls_of(arguments)),
+            is_simulated=True,
+            on_ready=announce,
+            is_dev=arguments.dev,
+            faults=arguments.faults,
+        )
 
 
 def _port(arguments: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from urc.cli.arguments import profile_path
 from urc.cli.colours import coloured_problem, is_terminal
 from urc.cli.output import complain, json_text
-from urc.problems import Problem, UrcError, has_errors, to_json
+from urc.problems import Problem, UrcError, has_errors, printable, to_json
 
 if TYPE_CHECKING:
     from urc.cli.progress import Progress
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 EXAMPLE = "urc validate puppet"
 
 FORMATS = ("text", "json", "sarif", "github")
+_BROWSER = "emscripten"
+"""Platform of the playground, which opens no transport, so no package is missing there."""
 
 
 class _Report:
@@ -41,8 +43,8 @@ class _Report:
         """Problems in command-line order, without duplicates from shared documents."""
         self.coverage: list[Coverage] = []
         """Test coverage of each tested profile."""
-        self.lacks: dict[str, None] = {}
-        """Missing libraries of this computer, which are no mistakes in the documents."""
+        self.notes: list[str] = []
+        """Notes about this computer, which are no problems of the documents."""
         self.looked_at: dict[str, None] = {}
         """Paths of all files that affect the result, including missing files."""
 
@@ -143,14 +145,24 @@ def _examine(paths: list[str], *, with_tests: bool, progress: "Progress | None" 
             _examine_folder(path, checked.widget, report)
         if checked.profile is not None:
             _examine_own_widgets(checked.profile, report)
-            _examine_libraries(checked.profile, report)
         if checked.profile is not None and with_tests:
             outcome = exercise(checked.profile)
             report.tests += len(checked.profile.tests)
             report.failed += len(outcome.problems)
             report.add(outcome.problems)
             report.coverage.append(measure(path, checked.profile.driver, outcome.exercised))
+        if checked.profile is not None and sys.platform != _BROWSER:
+            _note_missing_packages(path, checked.profile, report)
     return report
+
+
+def _note_missing_packages(path: str, profile: "Profile", report: _Report) -> None:
+    """Note each extra that the profile needs and this computer lacks."""
+    from urc.runtime.missing_packages import missing_packages
+    from urc.runtime.registries import built_in_catalog
+
+    for text in missing_packages(profile, {}, built_in_catalog().transports):
+        report.notes.append(f"{path} cannot be opened on this computer: {text}")
 
 
 def _examine_folder(
@@ -173,15 +185,6 @@ def _examine_own_widgets(profile: "Profile", report: _Report) -> None:
     for widget in profile.widgets.values():
         if widget.folder.resolve().parent != home:
             _examine_folder(str(widget.folder / "widget.yaml"), widget, report, with_demo=False)
-
-
-def _examine_libraries(profile: "Profile", report: _Report) -> None:
-    """Add the missing library of a camera. Other transports would take too long to import."""
-    if any(one.type == "camera" for one in profile.driver.transports.values()):
-        from urc.transports.camera import missing_library
-
-        if lack := missing_library():
-            report.lacks[lack] = None
 
 
 def _document_in(path: str) -> str:
@@ -229,8 +232,8 @@ def _print(report: _Report, arguments: argparse.Namespace, indent: int | None = 
             print(tell(problem), flush=True)
         if arguments.coverage:
             _print_coverage(report)
-        for lack in report.lacks:
-            complain(lack)
+        for note in report.notes:
+            complain(printable(note))
         complain(_summary(report))
 
 

@@ -126,6 +126,23 @@ def _ddmm(value: Any, hemisphere: Any = "N") -> float | None:
     return sign * (int(found[1] or 0) + float(found[2]) / 60)
 
 
+def _pick(values: Any, names: Any, wanted: Any) -> Any:
+    """Return the value of a name, or of each name in a list; None for a value that is missing.
+
+    ROS messages such as JointState contain a list of names and lists of values in the same order.
+    That order depends on the robot.
+    """
+    items, known = _list(values), _list(names)
+    if max(len(items), len(known)) > MAX_PARTS:
+        raise ValueError(f"'pick' takes at most {MAX_PARTS} names")
+    if not all(isinstance(name, str) for name in known):
+        raise TypeError("'pick' needs a list of names as text")
+    found = dict(zip(known, items, strict=False))
+    if isinstance(wanted, str):
+        return found.get(wanted)
+    return [found.get(_text(name)) for name in _list(wanted)]
+
+
 LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "ddmm": (_ddmm, (0, 1)),
     "first": (_end(0), (0, 0)),
@@ -133,6 +150,7 @@ LIST_FILTERS: Final[dict[str, tuple[Callable[..., Any], tuple[int, int]]]] = {
     "last": (_end(-1), (0, 0)),
     "max": (lambda value: max(_numbers(value)), (0, 0)),
     "min": (lambda value: min(_numbers(value)), (0, 0)),
+    "pick": (_pick, (2, 2)),
     "split": (_split, (0, 1)),
     "sum": (_sum, (0, 0)),
 }

@@ -19,6 +19,7 @@ from urc.patterns import Pattern
 
 __all__ = [
     "NUMBERED",
+    "RESTARTED",
     "Collect",
     "Count",
     "CountedFrame",
@@ -49,6 +50,9 @@ class Envelope(NamedTuple):
     """Content of the envelope: JSON-like data, or bytes."""
 
 
+RESTARTED: Final = "restarted"
+"""The verb of an envelope that a ROS transport makes if the robot's simulated clock went back. The
+body is one line of text about it."""
 NUMBERED: Final = frozenset(("call", "goal", "request", "get"))
 """Verbs of requests. The ``response`` to a request has the request's ``id``."""
 

@@ -24,7 +24,7 @@ sequences until only external events remain.
 from collections.abc import Mapping, Sequence
 
 from urc.model.driver import Command, Driver
-from urc.model.payload import Payload
+from urc.model.payload import RESTARTED, Envelope, Payload
 from urc.model.values import WHOLE_TYPES, Reading, Sample, Value
 from urc.protocol.events import (
     Close,
@@ -46,6 +46,7 @@ from urc.protocol.motion_encoder import MotionEncoder
 from urc.protocol.readings.readings import Readings
 from urc.protocol.requests.bounds import GOOD_BYE_S, calm_s, lines_of, needs_readings
 from urc.protocol.requests.condition_scope import SignalState
+from urc.protocol.requests.connection import GOAL
 from urc.protocol.requests.conversation import Conversation
 from urc.protocol.requests.encode import BadArgument, build_check
 from urc.protocol.requests.exchange import (
@@ -207,13 +208,29 @@ class Engine:
         `is_new` is false if the robot has sent nothing since the last call. The transport itself
         has then made the envelope, or has held it back. Such an envelope ends no silence.
         """
+        if isinstance(data, Envelope) and data.verb == RESTARTED:
+            self.readings.forget_stamps()
+            return []
         return self._settle(self.lines[transport].receive(data, now, is_new=is_new), now)
 
     def command(self, request: Request, now: float) -> list[Event]:
         """Run a command; exactly one `Replied` or `Failed` reports the outcome."""
         asked, people = ReplySink(request), request.confirmed_by
-        events = self.run(request.command, request.arguments, asked, now, confirmed_by=people)
+        events = self.run(
+            request.command,
+            request.arguments,
+            asked,
+            now,
+            confirmed_by=people,
+            unless=request.unless,
+        )
         return self._settle(events, now)
+
+    def may_send_goal(self, command: str) -> bool:
+        """Return whether a command sends a goal of a ROS action, or is a sequence, which may."""
+        found = self._commands.get(command)
+        is_goal = found is not None and found.send.options.get("verb") == GOAL
+        return is_goal or command in self.programs
 
     def tick(self, now: float) -> list[Event]:
         """Process all deadlines up to `now`."""
@@ -275,7 +292,8 @@ class Engine:
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink` exactly once.
 
-        If `unless` returns a reason at the time of sending, the command fails instead.
+        If `unless` returns a reason at the time of sending, the command fails instead. In a
+        sequence, only goals are checked.
         """
         found = self._commands.get(command)
         if found is None:
@@ -296,6 +314,7 @@ class Engine:
         if any(runner.program is program for runner in self._runners):
             return sink(ExchangeOutcome("at-work", f"{command} is already running"), now)
         runner = SequenceRunner(self, program, sink, privileged_on, confirmed_by)
+        runner.unless = unless
         runner.wait_for_logins(now)
         self._start_sequence(runner)
         return []

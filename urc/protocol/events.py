@@ -35,6 +35,9 @@ class Request(NamedTuple):
     """Names of the people who have confirmed the command, including the requester."""
     on_sent: Callable[[Payload], None] | None = None
     """Callback for each sent payload, except secret payloads and sequence payloads."""
+    unless: Callable[[], str] | None = None
+    """Function that returns why the command may no longer start, or "". It is called when the frame
+    leaves URC, because a command may wait in a queue and a goal may wait for its services."""
 
 
 class Open(NamedTuple):

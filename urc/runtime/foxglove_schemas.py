@@ -7,7 +7,15 @@ Layer 4. Pure. Source: github.com/foxglove/foxglove-sdk, schemas/jsonschema (MIT
 from collections.abc import Mapping
 from typing import Any, Final
 
-__all__ = ["COMPRESSED_IMAGE", "LASER_SCAN", "LOCATION_FIX", "LOG", "POINT_CLOUD", "POSE_IN_FRAME"]
+__all__ = [
+    "COMPRESSED_IMAGE",
+    "FRAME_TRANSFORMS",
+    "LASER_SCAN",
+    "LOCATION_FIX",
+    "LOG",
+    "POINT_CLOUD",
+    "POSE_IN_FRAME",
+]
 
 _TEXT: Final = {"type": "string"}
 _NUMBER: Final = {"type": "number"}
@@ -40,11 +48,8 @@ def _words(name: str, *words: str) -> dict[str, Any]:
 
 
 _VECTOR: Final = _message("Vector3", x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_POSE: Final = _message(
-    "Pose",
-    position=_VECTOR,
-    orientation=_message("Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER),
-)
+_ROTATION: Final = _message("Quaternion", x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+_POSE: Final = _message("Pose", position=_VECTOR, orientation=_ROTATION)
 
 COMPRESSED_IMAGE: Final = _message(
     "CompressedImage",
@@ -52,6 +57,20 @@ COMPRESSED_IMAGE: Final = _message(
     frame_id=_TEXT,
     data={"type": "string", "contentEncoding": "base64"},
     format=_TEXT,
+)
+FRAME_TRANSFORMS: Final = _message(
+    "FrameTransforms",
+    transforms={
+        "type": "array",
+        "items": _message(
+            "FrameTransform",
+            timestamp=_TIME,
+            parent_frame_id=_TEXT,
+            child_frame_id=_TEXT,
+            translation=_VECTOR,
+            rotation=_ROTATION,
+        ),
+    },
 )
 LOG: Final = _message(
     "Log",

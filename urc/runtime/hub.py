@@ -19,6 +19,7 @@ from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.image_viewers import ImageViewers
 from urc.runtime.redaction import Redactor
+from urc.runtime.running_goals import RunningGoal, RunningGoals
 from urc.runtime.topic_check import TopicMismatch
 from urc.transports.ros.topic_list import TopicList, TopicRow
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "STREAM_KEPT",
+    "TRANSPORT",
     "Hub",
     "LinkState",
     "LinkStatus",
@@ -129,6 +131,11 @@ class LinkStatus:
         return self.state == "connecting" and not self.attempts and not self.is_ready
 
 
+TRANSPORT: Final = "transport "
+"""Start of the source of a transport's log entries: a bare name, such as “wire”, would look like a
+word of the message."""
+
+
 @dataclass(frozen=True, slots=True)
 class LogEntry:
     """A log entry about a fault or a change of state."""
@@ -136,8 +143,13 @@ class LogEntry:
     time_s: float
     level: Literal["info", "warning", "error"]
     source: str
-    """Name of the transport or command that caused the entry."""
+    """Cause of the entry, such as ``transport wire``, ``engine`` or ``URC``."""
     text: str
+
+    @property
+    def place(self) -> str:
+        """Cause of the entry, of a transport its name only."""
+        return self.source.removeprefix(TRANSPORT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,9 +286,9 @@ class Hub:
         self.progress: dict[str, SequenceProgress] = {}
         """Progress of each sequence, by name; sequences that have never run are missing."""
         self.progress_count = 0
-        """Number of changes of `progress` and `moving` so far."""
-        self.moving: dict[str, int] = {}
-        """Number of unanswered calls of each command that has started autonomous motion."""
+        """Number of changes of `progress` and `goals` so far."""
+        self.goals = RunningGoals()
+        """Commands with autonomous motion that have not ended."""
         self.topic_lists: dict[str, TopicList] = {}
         """Newest list of the robot's topics, keyed by transport; empty without a connection."""
         self.topic_mismatches: tuple[TopicMismatch, ...] = ()
@@ -343,19 +355,28 @@ class Hub:
         self.revision += 1
         self._wake()
 
-    @contextmanager
-    def moved_by(self, command: str) -> Iterator[None]:
-        """Count a command as one that moves the robot, while the context is open."""
-        self._count_motion(command, 1)
-        try:
-            yield
-        finally:
-            self._count_motion(command, -1)
+    def begin_goal(self, goal: RunningGoal) -> int:
+        """Show a command with autonomous motion on all pages; return the goal's number."""
+        number = self.goals.begin(goal)
+        self._goals_changed()
+        return number
 
-    def _count_motion(self, command: str, change: int) -> None:
-        count = self.moving.pop(command, 0) + change
-        if count > 0:
-            self.moving[command] = count
+    def sent_goal(self, number: int, action: str) -> None:
+        """Note the ROS action to which a goal was sent."""
+        self.goals.sent(number, action)
+        self._goals_changed()
+
+    def end_goal(self, number: int, *, is_lost: bool = False) -> None:
+        """End a goal whose reply has arrived, or cannot arrive any more (`is_lost`)."""
+        self.goals.end(number, is_lost=is_lost)
+        self._goals_changed()
+
+    def settle_goals(self, action: str | None = None) -> None:
+        """Drop lost goals: a cancellation of their action, or STOP (None), has ended them."""
+        if self.goals.settle(action):
+            self._goals_changed()
+
+    def _goals_changed(self) -> None:
         self.progress_count += 1
         self.revision += 1
         self._wake()

@@ -110,13 +110,14 @@ def argument_property(argument: Argument) -> dict[str, object]:
     return {"type": argument.type}
 
 
-def sample_message(signal: Signal, sample: Sample, time_ns: int) -> bytes:
+def sample_message(signal: Signal, sample: Sample, time_ns: int, prefix: str = "") -> bytes:
     """Return a reading as JSON text.
 
     Args:
         signal: the signal.
         sample: a reading of the signal.
         time_ns: time of the reading, in nanoseconds since 1970.
+        prefix: text before the name of a point cloud's coordinate frame.
     """
     value = sample.value
     if signal.type in PICTURE_TYPES and isinstance(value, bytes):
@@ -130,7 +131,9 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int) -> bytes:
         )
     if signal.type == "point_cloud" and isinstance(value, bytes):
         with suppress(BadValue):  # the file comes from another program
-            return as_json({"timestamp": stamp(time_ns), **cloud_fields(value)})
+            fields = cloud_fields(value)
+            fields["frame_id"] = f"{prefix}{fields['frame_id']}"
+            return as_json({"timestamp": stamp(time_ns), **fields})
     told: dict[str, object] = {"value": value}
     if sample.alarm:
         told["alarm"] = sample.alarm

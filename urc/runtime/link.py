@@ -25,7 +25,7 @@ from collections.abc import Callable, Coroutine, Iterable
 from typing import Any
 
 from urc.model.driver import TransportSpec
-from urc.model.payload import Envelope, Payload
+from urc.model.payload import RESTARTED, Envelope, Payload
 from urc.protocol.events import Noted, Send, Violation
 from urc.runtime.clock import Clock, PeriodicTimer, within
 from urc.runtime.dispatcher import Dispatcher
@@ -463,6 +463,10 @@ class Link:
             self._has_news = True
         if isinstance(data, Envelope) and data.verb == NOTICE:
             self._report.log("warning", "notice", str(data.body))
+            return
+        if isinstance(data, Envelope) and data.verb == RESTARTED:
+            self._report.log("info", "clock", str(data.body))
+            self._dispatcher.receive(self._name, data, now, is_new=False)
             return
         if isinstance(data, Envelope) and data.verb == TOPICS:
             self._hub.set_topics(self._name, list_of(data))

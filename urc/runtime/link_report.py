@@ -6,7 +6,7 @@ from typing import Literal
 from urc.model.payload import Envelope, Payload, traffic_of
 from urc.protocol.events import Noted, Violation
 from urc.runtime.clock import Clock, Timer
-from urc.runtime.hub import Hub, LinkState, LinkStatus, LogEntry, Traffic
+from urc.runtime.hub import TRANSPORT, Hub, LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.redaction import REDACTED
 from urc.transports.base import TOPICS
 
@@ -65,6 +65,7 @@ class LinkReport:
 
     def __init__(self, transport: str, address: str, hub: Hub, clock: Clock) -> None:
         self._transport = transport
+        self._source = f"{TRANSPORT}{transport}"
         self._address = address
         self._hub = hub
         self._clock = clock
@@ -129,7 +130,7 @@ class LinkReport:
         if untold is None:
             return
         more = f" (and {untold} more like it)" if untold else ""
-        self._hub.log(LogEntry(self._clock.now(), level, self._transport, text + more))
+        self._hub.log(LogEntry(self._clock.now(), level, self._source, text + more))
 
     def note(self, entry: Noted) -> None:
         """Add a log entry that a message of the robot contains, within the rate limit."""
@@ -137,7 +138,7 @@ class LinkReport:
         if untold is None:
             return
         more = f" (after {untold} entries that are not shown)" if untold else ""
-        self._hub.log(LogEntry(self._clock.now(), entry.level, self._transport, entry.text + more))
+        self._hub.log(LogEntry(self._clock.now(), entry.level, self._source, entry.text + more))
 
     def saw(self, direction: Literal["sent", "received"], data: Payload) -> None:
         """Record traffic while the hub has traffic readers; requests for topics are left out."""

@@ -211,6 +211,8 @@ class OneShotCommands:
                 if self._controller().owed:
                     await self._clock.sleep(AGAIN_S)
             await self._await_answers(session, asked)
+        if self._controller().is_certain:
+            session.hub.settle_goals()
 
     async def _await_answers(self, session: Drivable, asked: dict[str, _Cancellation]) -> None:
         """Wait until the robot has answered the cancellations; the transport repeats them.

@@ -43,6 +43,7 @@ _TESTS: Final = {
     "scan": ("a sweep with a beam that saw nothing",),
     "battery": ("four fifths of the battery, and a current that is not measured",),
     "imu": ("ten degrees of roll, twenty of pitch and thirty of yaw",),
+    "camera": ("a picture of the camera, in base64",),
 }
 """Tests of the driver that need a message of each part."""
 
@@ -150,37 +151,16 @@ def document_of(base: BaseProfile) -> str:
 
 
 def _overrides(base: BaseProfile, has: set[str]) -> list[str]:
-    """Return the changes to the driver: parts that the robot lacks, and a camera."""
+    """Return the changes to the driver: parts that the robot lacks."""
     lines = []
     lacks = [name for name in _TESTS if name not in has]
     # An empty topic switches a message off, and the settings page can name the topic later.
     settings = [f'      {name}: {{ default: "" }}' for name in lacks]
     if base.via == "zenoh":
         settings.append("      bridge: { choices: [auto, rosbridge, foxglove, zenoh] }")
-    if "camera" in has:
-        topic = json.dumps(base.topics["camera"])
-        settings.append(
-            f"      camera: {{ type: string, default: {topic}, title: Camera topic,"
-            " group: Topics }"
-        )
     if settings:
         lines += ["    settings:", *settings]
-    if "camera" in has:
-        lines += ["    signals:", "      picture: { type: image, title: Camera }"]
-    messages = []
     tests = [test for name in lacks for test in _TESTS[name]]
-    if "camera" in has:
-        messages += [
-            "      camera:",
-            "        subscribe:",
-            '          topic: "{{ settings.camera }}"',
-            "          type: sensor_msgs/CompressedImage",
-            "          throttle: 100ms",
-            "          queue_length: 1",
-            "        json: { picture: data }",
-        ]
-    if messages:
-        lines += ["    messages:", *messages]
     if base.is_stamped:
         tests.append("a drive is a Twist")
     if tests:
@@ -191,10 +171,6 @@ def _overrides(base: BaseProfile, has: set[str]) -> list[str]:
 
 def _page(has: set[str], has_map: bool) -> list[str]:
     """Return the page: the picture or the map in the background, and the parts around the stick."""
-    lines = [""]
-    if "camera" in has:
-        lines += ["widgets:", "  camera: { use: camera, title: Camera, bind: { image: picture } }"]
-        lines.append("")
     place = "floor" if has_map else "map"
     background = "camera" if "camera" in has else place
     top = ["battery" if "battery" in has else ".", "speed", ".", "laser" if "scan" in has else "."]
@@ -202,7 +178,7 @@ def _page(has: set[str], has_map: bool) -> list[str]:
     if "imu" in has:
         low[2] = "attitude"
     return [
-        *lines,
+        "",
         "interfaces:",
         "  default:",
         f"    background: {background}",

@@ -284,6 +284,7 @@ class Session:
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Run a command and return its reply; the wait always has a time limit.
 
@@ -294,6 +295,8 @@ class Session:
             arguments: values of the arguments, by name; missing arguments use their defaults.
             confirmed_by: people who confirmed the command, for the two-person rule.
             on_sent: callback that receives each sent payload, except secrets and sequence payloads.
+            unless: function that returns why the command may no longer start, or ""; called when
+                the frame leaves URC.
 
         Raises:
             CommandFailed: the command was refused, timed out, or lost its connection.
@@ -302,7 +305,7 @@ class Session:
         if self._untried:
             await self._first_attempt(name, given)
         number = next(self._numbers)
-        request = new(Request, (number, name, given, confirmed_by, on_sent))
+        request = new(Request, (number, name, given, confirmed_by, on_sent, unless))
         try:
             outcome = await self._dispatcher.command(request)
         except asyncio.CancelledError:

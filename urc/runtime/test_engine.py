@@ -27,12 +27,14 @@ from urc.protocol.events import (
     Send,
     Violation,
 )
+from urc.protocol.forms.topics import namespace_of
 from urc.protocol.readings.readings import Decode
 from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import LineEvent
 from urc.protocol.requests.messages import Messages
 from urc.protocol.requests.reply_match import Matcher
 from urc.protocol.values.time_and_nonce import FIXED_UNIX_S, TimeAndNonce, fixed_bytes
+from urc.ros_names import resolved_name
 
 __all__ = ["Exercised", "Kind", "TestEngine", "encoded"]
 
@@ -186,12 +188,16 @@ class TestEngine:
     def _envelope(self, transport: str, piece: Envelope) -> Envelope:
         """Return the message as a transport delivers it.
 
-        A response includes its request's number.
+        A response includes its request's number. Relative names of ROS are in the namespace.
         """
         body = piece.body
         if body is not None and self.driver.transports[transport].type not in _BRINGS_OBJECTS:
             body = body if isinstance(body, bytes) else json.dumps(body).encode()
         attributes = dict(piece.attributes)
+        namespace = namespace_of(self.driver.transports[transport], self.settings)
+        for name in ("topic", "action"):
+            if isinstance(attributes.get(name), str):
+                attributes[name] = resolved_name(str(attributes[name]), namespace)
         if piece.verb in ("response", "feedback"):
             numbers = self._numbers.get(transport, [])
             if not numbers:

@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from urc.model.driver import Driver
 from urc.model.values import Value
 from urc.problems import UrcError
-from urc.protocol.forms.topics import published, topic_of
+from urc.protocol.forms.topics import namespace_of, published, topic_of
 from urc.transports.ros.topic_list import TopicList, TopicRow, short_type
 
 __all__ = ["TopicMismatch", "TopicUse", "find_mismatches", "topic_uses"]
@@ -50,7 +50,8 @@ def topic_uses(driver: Driver, settings: Mapping[str, Value]) -> list[TopicUse]:
     for message in driver.messages.values():
         if message.transport in lines and message.read.topic is not None:
             try:
-                topic = topic_of(message.read, settings)
+                namespace = namespace_of(driver.transports[message.transport], settings)
+                topic = topic_of(message.read, settings, namespace)
             except UrcError:
                 continue
             kind = str(message.read.listen.get("type") or "")

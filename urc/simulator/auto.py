@@ -17,12 +17,12 @@ from urc.model.sequence import ExpectStep, IfStep, PromptStep, RepeatStep, SendS
 from urc.model.values import NOTHING, Value
 from urc.patterns import Pattern, example
 from urc.protocol.forms.table import build_reader, build_writer
+from urc.protocol.forms.topics import context_of
 from urc.protocol.framing.base import Framing, FramingError
 from urc.protocol.framing.table import build_framing
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import build_raw
 from urc.protocol.values.payload import (
-    CodecContext,
     Frame,
     NotWritable,
     PayloadReader,
@@ -165,7 +165,7 @@ class DefaultConnection:
         self._robot = robot
         self._spec = spec
         self._framing = framing
-        self._context = CodecContext(spec.encoding, robot.settings, has_keys=spec.has_keys)
+        self._context = context_of(spec, robot.settings)
         self.opening, requests = self._script("on_connect", spec.on_connect)
         self._requests = [*requests, *self._declared()]
         self.messages: list[DefaultMessage] = []

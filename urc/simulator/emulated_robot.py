@@ -16,11 +16,11 @@ from functools import partial
 from typing import Final, Protocol
 
 from urc.expressions import Template
-from urc.model.driver import Driver, TransportSpec
+from urc.model.driver import Driver, Message, TransportSpec
 from urc.model.payload import Payload
 from urc.model.profile import Profile, SimulatorRule
 from urc.model.values import NOTHING, Reading, Value
-from urc.protocol.forms.topics import topic_of
+from urc.protocol.forms.topics import namespace_of, topic_of
 from urc.protocol.framing.base import FrameFault, Framing
 from urc.protocol.framing.table import build_framing
 from urc.protocol.values.payload import Frame
@@ -181,12 +181,17 @@ class EmulatedRobot:
         return {name: self._values.of(name, now_s) for name in self._values.driver.signals}
 
 
+def _topic(driver: Driver, message: Message, settings: Mapping[str, Value]) -> str:
+    namespace = namespace_of(driver.transports[message.transport], settings)
+    return topic_of(message.read, settings, namespace)
+
+
 def _pictures(
     driver: Driver, settings: Mapping[str, Value], senses: Iterable[str]
 ) -> Mapping[tuple[str, str], str]:
     """Return the signals whose values are camera images, keyed by transport and topic."""
     return {
-        (message.transport, topic_of(message.read, settings)): name
+        (message.transport, _topic(driver, message, settings)): name
         for message in driver.messages.values()
         for name in message.read.fields
         if message.read.topic is not None
@@ -442,4 +447,4 @@ class EmulatedConnection:
     def _fault(self, text: str) -> None:
         self.faults += 1
         self.last_fault = text
-        log.info("%s: %s", self._name, text)
+        log.info("transport %s: %s", self._name, text)

@@ -12,14 +12,13 @@ from urc.model.payload import Envelope, Payload, ReadSpec, traffic_of
 from urc.model.profile import Reaction, SimulatorRule
 from urc.model.values import NOTHING
 from urc.protocol.forms.table import build_reader, build_writer
-from urc.protocol.forms.topics import frame_of
+from urc.protocol.forms.topics import context_of, frame_of
 from urc.protocol.framing.base import Framing, FramingError
 from urc.protocol.framing.table import build_framing
 from urc.protocol.requests.rate import Counters
 from urc.protocol.values.convert import Unusable
 from urc.protocol.values.payload import (
     BadText,
-    CodecContext,
     Frame,
     NotWritable,
     PayloadReader,
@@ -102,7 +101,7 @@ class RuleSet:
         auto: DefaultConnection,
         values: Values,
     ) -> None:
-        self._context = CodecContext(spec.encoding, values.settings, has_keys=spec.has_keys)
+        self._context = context_of(spec, values.settings)
         self._framing = framing
         self._auto = auto
         self._values = values

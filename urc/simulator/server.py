@@ -15,7 +15,7 @@ from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.problems import UrcError
 from urc.protocol.forms.json_text import filled
-from urc.protocol.forms.topics import listened, published
+from urc.protocol.forms.topics import actions_of, listened, published
 from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.servers.base import (
     SERVERS,
@@ -49,8 +49,7 @@ async def serve(
         profile: profile with `simulator` rules.
         settings: values for ports and templates; for port 0, the system chooses a free port.
         host: local address to listen on; the default accepts only local clients.
-        now: function that returns the current time, in seconds since the epoch; templates read the
-            time as ``now``.
+        now: function that returns the time in seconds since the epoch, ``now`` in templates.
         is_anywhere: whether to listen on free ports instead of the profile's ports and paths.
         emulated_robot: emulated robot to serve; None to create one from the profile.
 
@@ -80,6 +79,7 @@ async def serve(
                 now=now,
                 topics=listened(profile.driver, name, settings),
                 taken={one.topic: one.type for one in published(profile.driver, name, settings)},
+                actions=actions_of(profile.driver, name, settings),
                 is_anywhere=is_anywhere or bool(spec.tunnel),
                 picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
                 last_peer=last_peer,

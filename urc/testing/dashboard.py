@@ -172,6 +172,7 @@ class FakeRobot:
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Record the command, report its sent frame, and return the test's reply."""
         if on_sent is not None:
@@ -206,4 +207,4 @@ class FakeRobot:
 
     def log(self, text: str) -> None:
         """Add an entry to the log."""
-        self.hub.log(LogEntry(self.clock.now(), "info", "wire", text))
+        self.hub.log(LogEntry(self.clock.now(), "info", "transport wire", text))

@@ -10,7 +10,7 @@ from urc._extras import missing
 from urc.transports.base import MissingPackage, Transport, TransportSetup
 from urc.transports.camera_options import read_options
 
-__all__ = ["from_setup", "missing_library"]
+__all__ = ["from_setup"]
 
 
 def from_setup(setup: TransportSetup) -> Transport:
@@ -21,13 +21,8 @@ def from_setup(setup: TransportSetup) -> Transport:
         MissingPackage: the library is not installed.
     """
     options = read_options(setup)
-    if lack := missing_library():
-        raise MissingPackage(lack)
+    if find_spec("av") is None:
+        raise MissingPackage(missing("camera needs", "av", "video"))
     from urc.transports.camera_transport import CameraTransport
 
     return CameraTransport(options)
-
-
-def missing_library() -> str:
-    """Return a message that names the missing library and its command; "" if it is installed."""
-    return missing("camera needs", "av", "video") if find_spec("av") is None else ""

@@ -40,6 +40,7 @@ __all__ = [
     "QuestionEndMessage",
     "TokenMessage",
     "SequenceRow",
+    "GoalRow",
     "ProgressMessage",
     "TopicMismatchRow",
     "TopicsMessage",
@@ -299,6 +300,23 @@ class SequenceRow(msgspec.Struct, omit_defaults=False, frozen=True):
     reason: str
 
 
+class GoalRow(msgspec.Struct, omit_defaults=True, frozen=True):
+    """One command with autonomous motion, as in `urc.runtime.running_goals.RunningGoal`."""
+
+    number: int
+    command: str
+    places: Mapping[str, object]
+    """Arguments of the command that are numbers or lists of numbers."""
+    by: str
+    """Name of the operator who has started it."""
+    page: str
+    """Identifier of the operator's page, as in `LeaseMessage.you`."""
+    since: int
+    """Time since its start, in milliseconds."""
+    lost: bool = False
+    """Whether its reply can't arrive any more, although the robot may go on."""
+
+
 class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True):
     """The state of all sequences, and the commands that now move the robot.
 
@@ -308,6 +326,9 @@ class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True
 
     sequences: list[SequenceRow]
     moving: list[str] = []
+    goals: list[GoalRow] = []
+    """The unanswered commands with autonomous motion, oldest first, and goals whose reply is
+    lost."""
 
 
 class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):

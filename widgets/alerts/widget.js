@@ -25,6 +25,7 @@ export default {
     const spoken = new Map();
     let watched = { limited: 1, known: 0 }; // until the page reports it
     let isUp = false;
+    let isRefused = false;
     let isMuted = false;
 
     function look() {
@@ -37,7 +38,7 @@ export default {
     /** @param {Alert[]} fresh */
     function spokenOf(fresh) {
       const words = fresh.slice(0, 3).map((alert) => `${alert.title}: ${wordOf(alert).replace(/^[▲◆]\s*/, "")}`);
-      const more = fresh.length > 3 ? [t("+{count} more", { count: fresh.length - 3 })] : [];
+      const more = fresh.length > 3 ? [t("{count} more", { count: fresh.length - 3 })] : [];
       return [...words, ...more].join(". ");
     }
 
@@ -63,7 +64,7 @@ export default {
       const said = alerts.length === 0 ? [calm()] : [
         t("{count} not acknowledged", { count }),
         shelved > 0 ? t("{count} shelved", { count: shelved }) : "",
-        left > 0 ? t("+{count} more", { count: left }) : "",
+        left > 0 ? t("{count} more", { count: left }) : "",
       ];
       const words = [...said, unknown()].filter(Boolean).join(" · ");
       write(note, alerts.length === 0 ? `— ${words}` : words);
@@ -79,7 +80,7 @@ export default {
     /** Number of signals with limits but without a value. */
     function unknown() {
       const count = watched.limited - watched.known;
-      if (!isUp) return t("no connection to URC");
+      if (!isUp) return isRefused ? t("not connected to the robot") : t("no connection to URC");
       return count > 0 ? t("unknown values: {count} of {all}", { count, all: watched.limited }) : "";
     }
 
@@ -146,6 +147,7 @@ export default {
     });
     follow("links", (news) => {
       isUp = news.isUp;
+      isRefused = news.isRefused ?? false;
       show();
     });
     follow("lease", show); // the lease determines the rights

@@ -34,6 +34,8 @@ export default {
     /** @type {readonly Link[]} */
     let links = [];
     let isReplay = false;
+    /** Whether URC is reachable, but cannot open the robot. */
+    let isRefused = false;
     let rate = { messages: NaN, bytes: NaN };
     let before = { ms: performance.now(), messages: -1, bytes: 0 };
 
@@ -45,6 +47,7 @@ export default {
     });
     follow("links", (news) => {
       links = news.links;
+      isRefused = news.isRefused ?? false;
       isReplay = news.isReplay ?? false;
       show();
     });
@@ -70,7 +73,7 @@ export default {
         return;
       }
       const words = !isUp
-        ? t("No connection to URC")
+        ? isRefused ? t("Cannot open") : t("No connection to URC")
         : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
       // Hidden for a lost robot: operators could mistake the trip to URC for the trip to the robot.
       const trip = tripMs === null || worst !== "live" ? "" : ` · ${figure(tripMs)} ms`;

@@ -6,8 +6,9 @@
  * fails, the waypoints that are left are *kept*. The robot continues only after a new confirmation.
  *
  * If the outcome is unknown, for example after the loss of a connection, the route is *lost*: it stays
- * active, because the robot may go on. A route of another screen, or from before a reload, is known
- * only from the robot's feedback; the operator can end it.
+ * active, because the robot may go on. The server tells of the goals and routes of other pages, and of
+ * those from before a reload. After a restart of the server, a route is known only from the robot's
+ * feedback; the operator can end it.
  *
  * @typedef {import("../../urc/web/static/core/types.js").Context} Context
  * @typedef {import("./geo.js").Place} Place
@@ -15,7 +16,9 @@
  *
  * @typedef {object} ActiveRoute
  * @property {Route} route
- * @property {number} number Number of its command.
+ * @property {number} number Number of its command; 0 for a route of another page.
+ * @property {number} goal Number of its goal at the server; 0 while unknown.
+ * @property {string} by Name of the operator on another page; "" for a route of this page.
  * @property {number} at Waypoint to which the robot is on its way, from 0.
  * @property {number} serial Serial number of the feedback before the route.
  * @property {"" | "pause" | "clear"} end Why the operator ends it.
@@ -25,9 +28,11 @@
  */
 import { attribute, button, write } from "urc/kit";
 import { Feedback } from "./feedback.js";
+import { placeArguments, routeArguments } from "./goal_arguments.js";
 import { distance, distanceText, isInside, lengthOf, placeText, wrapped } from "./geo.js";
 import { Route } from "./route.js";
 import { RouteList } from "./route_list.js";
+import { shareGoals } from "./shared_goals.js";
 
 /** Time after which a command counts as one that takes long, such as a goal, in milliseconds. */
 const SOON_MS = 1000;
@@ -72,8 +77,12 @@ export class Choice {
      * @type {ActiveRoute | null}
      */
     this.active = null;
+    /** Place that the robot is on its way to, outside a route. @type {import("./goal_arguments.js").Trip | null} */
+    this.trip = null;
     /** Waypoints that are left of a route that has ended early. @type {Route | null} */
     this.kept = null;
+    /** Goals of all pages. @type {import("../../urc/web/static/core/types.js").Topics["goals"]} */
+    this.news = { isKnown: false, goals: [] };
     this.feedback = new Feedback();
     /** Timer for the end of feedback that the driver does not limit. @type {number | undefined} */
     this.timer = undefined;
@@ -93,9 +102,12 @@ export class Choice {
     this.pose = undefined;
     /** @type {Outlet | undefined} */
     this.end = undefined;
+    /** @type {Outlet | undefined} */
+    this.endGoal = undefined;
     this.bar = document.createElement("div");
     this.bar.className = "map-bar";
     this.bar.setAttribute("role", "group");
+    this.bar.setAttribute("data-taken", "");
     this.bar.setAttribute("aria-label", t("Choose a place"));
     this.words = document.createElement("p");
     this.words.className = "map-words";
@@ -140,6 +152,7 @@ export class Choice {
     this.waypoints = outputs["waypoints"];
     this.pose = outputs["initial_pose"];
     this.end = outputs["end_route"];
+    this.endGoal = outputs["end_goal"];
     this.feedback.take(progress);
     if (progress) this.advance(progress);
     this.robotYaw = yaw;
@@ -161,16 +174,23 @@ export class Choice {
   get places() {
     if (this.mode === "place") return this.spot ? [this.spot] : [];
     if (this.mode !== "look") return this.route.places;
-    return this.active ? this.active.route.places.slice(this.active.at) : this.kept?.places ?? [];
+    if (this.active) return this.active.route.places.slice(this.active.at);
+    return this.kept?.places ?? (this.trip ? [this.trip.place] : []);
   }
 
   /** Directions to draw, for each place; [] without directions. @returns {readonly number[]} */
   get angles() {
     if (this.mode === "place") return this.yaw === null ? [] : [this.yaw];
+    if (this.isTrip) return this.trip?.yaw === null || !this.trip ? [] : [this.trip.yaw];
     if (!this.turns.has("waypoints")) return [];
     if (this.mode !== "look") return this.directions(this.route);
     if (this.active) return this.directions(this.active.route).slice(this.active.at);
     return this.kept ? this.directions(this.kept) : [];
+  }
+
+  /** Whether the place that the robot is on its way to is shown. */
+  get isTrip() {
+    return this.mode === "look" && this.trip !== null && !this.active && !this.kept;
   }
 
   /** @param {Route} route */
@@ -328,12 +348,12 @@ export class Choice {
     this.show();
   }
 
-  /** End a route that this page has not sent, or no longer knows. */
+  /** End a goal, or a route that this page has not sent or no longer knows. */
   async endOther() {
     if (this.isEnding) return;
     this.isEnding = true;
     this.show();
-    if (await this.sendEnd()) {
+    if (await this.sendEnd(this.isTrip ? "end_goal" : "end_route")) {
       this.feedback.end(); // newer feedback shows the button again
       this.outcome = `✓ ${this.t("sent")}`;
     }
@@ -341,11 +361,11 @@ export class Choice {
     this.edited();
   }
 
-  /** Send the end of the route; return whether that succeeded. */
-  async sendEnd() {
+  /** Send the end of a route or goal; return whether that succeeded. @param {"end_route" | "end_goal"} [output] */
+  async sendEnd(output = "end_route") {
     this.outcome = "";
     try {
-      await this.send("end_route", {});
+      await this.send(output, {});
     } catch (error) {
       this.outcome = `▲ ${error instanceof Error ? error.message : error}`;
       return false;
@@ -382,13 +402,14 @@ export class Choice {
     const { mode, places, t } = this;
     const isWay = mode === "way" || mode === "sure";
     const isIdle = mode === "look" && !this.aiming;
-    const isOther = this.isOther();
+    const isTrip = isIdle && this.isTrip;
+    const isOther = this.isOther() && !this.isTrip;
     const [active, kept] = [isIdle ? this.active : null, isIdle && !this.active && !isOther ? this.kept : null];
     const isTurned = (mode === "place" && this.yaw !== null) || (mode === "way" && places.length > 0 && this.turns.has("waypoints"));
     const hide = (/** @type {Element} */ part, /** @type {boolean} */ isShown) => attribute(part, "hidden", isShown ? null : "");
     const disable = (/** @type {Element} */ part, /** @type {boolean} */ isOff) => attribute(part, "disabled", isOff ? "" : null);
-    attribute(this.bar, "data-moving", this.active || isOther ? "" : null); // Escape is then STOP
-    hide(this.bar, !isIdle || this.outcome !== "" || active !== null || kept !== null || isOther);
+    attribute(this.bar, "data-moving", this.active || this.trip || isOther ? "" : null); // Escape is then STOP
+    hide(this.bar, !isIdle || this.outcome !== "" || active !== null || kept !== null || isOther || isTrip);
     hide(this.no, !isIdle);
     disable(this.no, this.isBusy);
     for (const one of [this.left, this.right]) {
@@ -400,8 +421,9 @@ export class Choice {
     const canEnd = active !== null && this.end !== undefined;
     const cannotEnd = (this.end?.reason ?? "") !== "";
     const isEnding = active !== null && (active.isEnding || cannotEnd);
-    hide(this.stopRoute, isIdle && isOther);
-    disable(this.stopRoute, this.isEnding || cannotEnd);
+    hide(this.stopRoute, (isIdle && isOther) || (isTrip && this.endGoal !== undefined));
+    disable(this.stopRoute, this.isEnding || (isTrip ? (this.endGoal?.reason ?? "") !== "" : cannotEnd));
+    write(this.stopRoute, isTrip ? t("Cancel goal") : t("End route"));
     hide(this.pause, canEnd);
     disable(this.pause, isEnding);
     hide(this.drop, canEnd || kept !== null || (mode === "way" && places.length > 0));
@@ -415,7 +437,7 @@ export class Choice {
     write(this.yes, mode === "place" && this.target === "initial_pose" ? t("It is here") : send);
     attribute(this.bar, "data-mode", mode);
     const text = reason && places.length > 0 ? `▲ ${reason}` : this.question();
-    const isToldToo = kept !== null || active?.isLost || (isIdle && isOther);
+    const isToldToo = kept !== null || active?.isLost || active?.number === 0 || isTrip || (isIdle && isOther);
     write(this.words, this.outcome ? [this.outcome, isToldToo ? text : ""].filter(Boolean).join(" · ") : text);
   }
 
@@ -451,7 +473,13 @@ export class Choice {
     if (mode === "look" && this.aiming) return t("Press on the place, and drag in the direction.");
     if (mode === "look" && active) {
       const way = { number: active.at + 1, count: active.route.size };
-      return active.isLost ? t("The robot may still be on its way to waypoint {number} of {count}", way) : t("On the way to waypoint {number} of {count}", way);
+      const told = active.isLost ? t("The robot may still be on its way to waypoint {number} of {count}", way) : t("On the way to waypoint {number} of {count}", way);
+      return [told, active.by].filter(Boolean).join(" · ");
+    }
+    if (this.isTrip && this.trip) {
+      const { by, isLost, yaw: turn } = this.trip;
+      const way = { place: this.placeText(this.trip.place, turn) };
+      return [isLost ? t("The robot may still be on its way to {place}", way) : t("On the way to {place}", way), by].filter(Boolean).join(" · ");
     }
     const { told } = this.feedback;
     if (mode === "look" && told && this.isOther()) return t("On the way to waypoint {number}", { number: told.value + 1 });
@@ -472,11 +500,13 @@ export class Choice {
     }
     const isPlace = this.mode === "place";
     const number = (this.sent += 1);
-    const given = isPlace ? this.one() : this.all();
+    const given = isPlace
+      ? placeArguments(this.places[0] ?? [0, 0], this.yaw, this.isLocal)
+      : routeArguments(this.places, this.turns.has("waypoints") ? this.angles : null, this.isLocal);
     if (!isPlace) {
       const { serial } = this.feedback;
       const before = this.active;
-      this.active = { route: this.route.rest(0), number, at: 0, serial, end: "", isEnding: false, isLost: false, before };
+      this.active = { route: this.route.rest(0), number, goal: 0, by: "", at: 0, serial, end: "", isEnding: false, isLost: false, before };
     }
     this.isBusy = true;
     this.outcome = `… ${this.t("sending")}`;
@@ -501,7 +531,7 @@ export class Choice {
     if (isRoute) this.kept = null;
     if (isRoute && this.active) this.active.before = null;
     this.clear();
-    this.outcome = isRoute && this.end ? "" : `… ${this.t("on the way")}`;
+    this.outcome = (isRoute && this.end) || this.trip ? "" : `… ${this.t("on the way")}`;
     this.show();
   }
 
@@ -534,7 +564,7 @@ export class Choice {
       const done = isQuick ? `✓ ${this.t("sent")}` : this.t("✓ done");
       this.outcome = end === "" || !fault ? fault || done : end === "pause" ? this.t("Paused") : "";
     }
-    this.edited();
+    shareGoals(this, this.news); // another page may have replaced it
   }
 
   /**
@@ -558,31 +588,4 @@ export class Choice {
     this.kept = rest;
     if (this.mode === "look") this.route = rest;
   }
-
-  one() {
-    const [first, second] = rounded(this.places[0] ?? [0, 0], this.isLocal);
-    const turn = this.yaw === null ? {} : { yaw: Math.round(this.yaw * 1e4) / 1e4 };
-    return this.isLocal ? { x: second, y: first, ...turn } : { latitude: first, longitude: second, ...turn };
-  }
-
-  /** @returns {any} lists, for commands with array arguments */
-  all() {
-    const places = this.places.map((place) => rounded(place, this.isLocal));
-    const [firsts, seconds] = [places.map(([first]) => first), places.map(([, second]) => second)];
-    if (!this.isLocal) return { latitudes: firsts, longitudes: seconds };
-    const yaws = this.angles.map((yaw) => Math.round(yaw * 1e4) / 1e4);
-    return { xs: seconds, ys: firsts, ...(this.turns.has("waypoints") ? { yaws } : {}) };
-  }
-}
-
-/**
- * Round to a millimetre, or to a centimetre on the Earth.
- *
- * @param {Place} place
- * @param {boolean} isLocal
- * @returns {Place}
- */
-function rounded([first, second], isLocal) {
-  const factor = isLocal ? 1e3 : 1e7;
-  return [Math.round(first * factor) / factor, Math.round(second * factor) / factor];
 }

@@ -156,6 +156,15 @@ export function bearingOf(yaw) {
 }
 
 /**
+ * Return a bearing as text with three figures, such as `007°`.
+ *
+ * @param {number} bearing in degrees
+ */
+export function headingText(bearing) {
+  return `${String(((Math.round(bearing) % 360) + 360) % 360).padStart(3, "0")}°`;
+}
+
+/**
  * Return a round grid spacing in metres: 1, 2 or 5 times a power of ten, at least `pixels` apart.
  *
  * @param {number} metresPerPixel
@@ -190,7 +199,16 @@ export function readFix(fix) {
   return { place, accuracy: spread > 0 && Number.isFinite(spread) ? Math.sqrt(spread / 2) : null };
 }
 
-/** The trail of past places, limited in number and with a minimum distance. */
+/** Speed above which a robot did not move, but its map or its position was reset, in m/s. */
+const FASTEST = { onEarth: 150, onMap: 20 };
+/** Shortest jump, in metres, and shortest time between two places, in milliseconds. */
+const JUMP_M = 1;
+const LEAST_MS = 50;
+
+/**
+ * The trail of past places, limited in number and with a minimum distance. A jump starts a new trail, as
+ * no robot has moved along the line between its ends.
+ */
 export class Trail {
   /**
    * @param {number} most largest number of places
@@ -203,18 +221,39 @@ export class Trail {
     this.isLocal = isLocal;
     /** @type {Place[]} */
     this.places = [];
+    /** Newest place, which may be too near for the trail. @type {Place | null} */
+    this.newest = null;
+    this.newestMs = 0;
+  }
+
+  clear() {
+    this.places = this.places.slice(-1);
   }
 
   /**
    * @param {Place} place
+   * @param {number} nowMs
    * @returns {boolean} whether it is a new place
    */
-  add(place) {
+  add(place, nowMs) {
+    if (this.newest && this.isJump(this.newest, place, nowMs - this.newestMs)) this.places = [];
+    [this.newest, this.newestMs] = [place, nowMs];
     const last = this.places.at(-1);
     if (last && distance(last, place, this.isLocal) < this.apart) return false;
     this.places.push(place);
     if (this.places.length > this.most) this.places.shift();
     return this.most > 0;
+  }
+
+  /**
+   * @param {Place} from
+   * @param {Place} to
+   * @param {number} tookMs
+   */
+  isJump(from, to, tookMs) {
+    const metres = distance(from, to, this.isLocal);
+    const fastest = this.isLocal ? FASTEST.onMap : FASTEST.onEarth;
+    return metres > JUMP_M && metres > (fastest * Math.max(LEAST_MS, tookMs)) / 1000;
   }
 }
 

@@ -2,22 +2,26 @@
 /** A grid in metres under the map, which shows motion and distances without tiles. */
 /** @typedef {import("leaflet").Map} LeafletMap */
 /** @typedef {import("./geo.js").Place} Place */
-import { colours, write } from "urc/kit";
+import { colours, part, style, write } from "urc/kit";
 import { wholes } from "urc/axis_ticks";
 import { distance, distanceText, gridStep, perMetre } from "./geo.js";
 
+/** Width of a map with smaller squares, in pixels. */
+const NARROW_PX = 480;
 /** Maximum number of lines; no screen shows this many. */
 const MOST_LINES = 200;
 
 export class Grid {
   /**
    * @param {LeafletMap} map
-   * @param {HTMLElement} scale shows the size of a square
+   * @param {HTMLElement} scale bar as long as the side of a square
    * @param {boolean} isLocal
    */
   constructor(map, scale, isLocal) {
     this.map = map;
     this.scale = scale;
+    this.length = part(scale, ".map-bar-length");
+    part(scale, ".map-north").hidden = isLocal; // "up" is no direction of the Earth there
     this.isLocal = isLocal;
     /** @type {Place} */
     this.origin = [0, 0];
@@ -64,8 +68,9 @@ export class Grid {
     this.under?.(pen);
     const [one, other] = [map.containerPointToLatLng([0, height / 2]), map.containerPointToLatLng([100, height / 2])];
     const metres = distance([one.lat, one.lng], [other.lat, other.lng], isLocal) / 100;
-    const step = gridStep(metres);
-    write(this.scale, `▦ ${distanceText(step)}`);
+    const step = gridStep(metres, width < NARROW_PX ? 40 : 64); // the scale bar leaves room for the place
+    write(this.length, distanceText(step));
+    style(this.scale, "--map-step", `${(step / metres).toFixed(1)}px`);
     const [up, across] = perMetre(this.origin, isLocal);
     pen.strokeStyle = this.ink?.faint ?? "";
     pen.lineWidth = 1;

@@ -8,10 +8,11 @@
 import { DASH, attribute, button, colours, isStill, many, noteOf, number, part, style, svg, write } from "urc/kit";
 import { Aim } from "./aim.js";
 import { Choice } from "./choose.js";
-import { Trail, arrowOf, bearingOf, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
+import { Trail, arrowOf, bearingOf, headingText, isInside, placeOf, placeText, placesOf, readFix } from "./geo.js";
 import { Grid } from "./grid.js";
 import { cornersOf, sizeText } from "./grid_image.js";
 import { Occupancy } from "./occupancy.js";
+import { shareGoals } from "./shared_goals.js";
 import { Shapes, metresOf } from "./shapes.js";
 
 /** Inputs of which one is enough for the robot's own map. */
@@ -27,6 +28,7 @@ export default {
     if (ctx.signal.aborted) return {};
     const chart = new Chart(ctx, leaflet);
     ctx.follow("theme", () => chart.theme());
+    ctx.follow("goals", (news) => chart.share(news));
     return {
       update: (readings, outputs) => chart.update(readings, outputs),
       resize: () => chart.resize(),
@@ -47,6 +49,7 @@ class Chart {
     this.options = options;
     this.root = part(el, ".map");
     this.text = part(el, ".map-text");
+    this.heading = part(el, ".map-heading");
     this.note = part(el, ".map-note");
     /** @type {"decimal" | "dms"} */
     this.form = options["format"] === "dms" ? "dms" : "decimal";
@@ -56,6 +59,8 @@ class Chart {
     this.ctx = ctx;
     this.isFollowing = true;
     this.hasPlace = false;
+    /** Goals of all pages. @type {import("../../urc/web/static/core/types.js").Topics["goals"]} */
+    this.goals = { isKnown: false, goals: [] };
     /** @type {Readonly<Record<string, any>> | undefined} */
     this.readings = undefined;
     /** @type {Place | null} */
@@ -152,7 +157,14 @@ class Chart {
       this.drawChoice();
     });
     if ("goto" in outputs || "waypoints" in outputs || "initial_pose" in outputs) this.listen();
+    shareGoals(this.choice, this.goals);
     if (fence.length > 2) this.map.fitBounds(new this.leaflet.LatLngBounds(fence), { animate: false });
+  }
+
+  /** Show the goals of all pages. @param {import("../../urc/web/static/core/types.js").Topics["goals"]} news */
+  share(news) {
+    this.goals = news;
+    if (this.choice) shareGoals(this.choice, news);
   }
 
   listen() {
@@ -187,8 +199,13 @@ class Chart {
     };
     add("+", this.t("Zoom in"), () => this.map.zoomIn());
     add("−", this.t("Zoom out"), () => this.map.zoomOut());
-    this.follower = add("◎", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    this.follower = add("", this.t("Follow the robot"), () => this.follow(!this.isFollowing));
+    this.follower.append(icon(FOLLOW));
     if (hasGrids) add("⤢", this.t("Show the whole map"), () => this.fit());
+    this.eraser = add("", this.t("Clear the trail"), () => this.clearTrail());
+    this.eraser.append(icon(ERASE));
+    this.eraser.classList.add("map-eraser");
+    this.eraser.hidden = true;
     if (hasWay) this.wayButton = add("⤳", this.t("Draw a route"), () => this.toggleWay());
     part(this.root, ".map-frame").append(row);
     this.tools = row;
@@ -246,6 +263,17 @@ class Chart {
     this.describe();
   }
 
+  drawTrail() {
+    const { places } = this.trail;
+    this.layers?.trail.setLatLngs(places);
+    if (this.eraser && this.eraser.hidden !== places.length < 2) this.eraser.hidden = places.length < 2;
+  }
+
+  clearTrail() {
+    this.trail.clear();
+    this.drawTrail();
+  }
+
   toggleWay() {
     this.choice?.toggleWay();
     this.drawChoice();
@@ -273,7 +301,7 @@ class Chart {
       fence,
       holder,
       arrow,
-      trail: line({ weight: 3 }),
+      trail: line({ weight: 4 }),
       way: line({ weight: 3, dashArray: "8 6" }),
       turn: line({ weight: 4 }),
       ring: new leaflet.Circle([0, 0], { radius: 0, weight: 1, interactive: false }),
@@ -365,14 +393,18 @@ class Chart {
     if (!place) {
       layers.robot.remove();
       layers.ring.remove();
+      write(this.heading, "");
       this.hasPlace = false;
       return;
     }
     style(layers.arrow, "transform", `rotate(${(heading ?? 0).toFixed(1)}deg)`);
+    const isTold = heading !== null && isLive && !this.isLocal;
+    const said = isTold && this.t("heading {angle}", { angle: headingText(heading) });
+    write(this.heading, said ? ` · ${said}` : "");
     attribute(layers.holder, "data-heading", heading === null ? "unknown" : "known");
     const look = `${place} ${accuracy} ${isLive}`;
     if (look === this.drawn && this.hasPlace) return; // true for most readings of a robot at rest
-    if (isLive && this.trail.add(place)) layers.trail.setLatLngs(this.trail.places);
+    if (isLive && this.trail.add(place, performance.now())) this.drawTrail();
     if (!this.hasPlace) layers.robot.addTo(map);
     layers.robot.setLatLng(place);
     layers.ring.setLatLng(place).setRadius(accuracy ?? 0);
@@ -395,7 +427,7 @@ class Chart {
   markOf(place, index) {
     const { choice, leaflet, ink } = this;
     const isIn = isInside(place, this.fence);
-    const isRoute = choice !== undefined && choice.mode !== "place" && choice.places.length <= NUMBERED;
+    const isRoute = choice !== undefined && choice.mode !== "place" && !choice.isTrip && choice.places.length <= NUMBERED;
     if (!isRoute) {
       const color = (isIn ? ink?.text : ink?.caution) ?? "";
       return new leaflet.CircleMarker(place, { radius: 9, weight: 3, color, fillOpacity: 0, interactive: false });
@@ -428,6 +460,17 @@ class Chart {
       attribute(this.wayButton, "aria-pressed", String(isWay));
     }
   }
+}
+
+/** Drawings of buttons whose characters are too small in most fonts. */
+const FOLLOW = "M12 5a7 7 0 1 0 .01 0M12 2v5M12 17v5M2 12h5M17 12h5";
+const ERASE = "M4 7h16M9 7V4h6v3M6.5 7l1 13h9l1-13";
+
+/** @param {string} path */
+function icon(path) {
+  const drawing = svg("svg", { class: "map-icon", viewBox: "0 0 24 24", "aria-hidden": "true" });
+  drawing.append(svg("path", { d: path }));
+  return drawing;
 }
 
 /** Maximum number of waypoints with numbers on the map; more numbers would cover each other. */

@@ -10,10 +10,12 @@ export class SmallLegend {
   /**
    * @param {HTMLElement} root element of the widget
    * @param {HTMLElement} list
+   * @param {(count: number) => string} words number of the entries that do not fit, as text
    * @param {AbortSignal} signal
    */
-  constructor(root, list, signal) {
+  constructor(root, list, words, signal) {
     this.list = list;
+    this.words = words;
     this.rest = document.createElement("li");
     this.rest.className = "plot-rest";
     this.rest.setAttribute("aria-hidden", "true");
@@ -53,7 +55,7 @@ export class SmallLegend {
     }
     items.forEach((item, place) => item.toggleAttribute("data-hidden", place >= shown));
     if (shown < items.length) {
-      write(rest, `+${items.length - shown}`);
+      write(rest, this.words(items.length - shown));
       if (!rest.isConnected) list.append(rest);
     } else rest.remove();
   }
@@ -63,8 +65,6 @@ export class SmallLegend {
 function widthOf(item) {
   const parts = [...(item.firstElementChild?.children ?? [])];
   const widths = parts.map((part) => (part instanceof HTMLElement ? part.offsetWidth : 0));
-  return widths.reduce((sum, width) => sum + width, SPACES_PX);
+  const gap = parseFloat(getComputedStyle(item.firstElementChild ?? item).columnGap) || 0;
+  return widths.reduce((sum, width) => sum + width + gap, -gap);
 }
-
-/** Spaces between the parts of an entry, in pixels. */
-const SPACES_PX = 4;

@@ -32,7 +32,7 @@ class Plot {
     this.root = part(el, ".plot");
     this.board = part(el, ".plot-board");
     this.note = part(el, ".plot-note");
-    this.legend = new SmallLegend(this.root, part(el, ".plot-legend"), ctx.signal);
+    this.legend = new SmallLegend(this.root, part(el, ".plot-legend"), (count) => ctx.t("{count} more", { count }), ctx.signal);
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
     this.windowS = seconds(options["window"]);

@@ -29,7 +29,7 @@ class Table {
     const table = el.querySelector("table");
     if (!table) throw new Error("the template has no table");
     const [room, scroll, more] = [part(el, ".table-room"), part(el, ".table-scroll"), part(el, ".table-more")];
-    keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${t("+{count} more", { count })}`, ctx.signal);
+    keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${t("{count} more", { count })}`, ctx.signal);
     const filter = el.querySelector(".table-filter");
     this.filter = filter instanceof HTMLInputElement ? filter : null;
     this.filter?.addEventListener("input", () => this.draw(), { signal: ctx.signal });

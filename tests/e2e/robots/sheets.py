@@ -31,7 +31,26 @@ class Sample(NamedTuple):
 
 _ZERO = {"linear": {"x": 0, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}}
 _TWIST = Envelope("publish", {"topic": "/cmd_vel"}, _ZERO)
-_ROS = ("absolem", "generic-ros1", "generic-ros2", "turtlebot3", "turtlebot4")
+_ROS = ("absolem", "generic-ros1", "generic-ros2", "spot", "turtlebot3", "turtlebot4")
+_STILL = {name: dict.fromkeys("xyz", 0) for name in ("linear", "angular")}
+_HEADER = {"stamp": "now", "frame_id": "base_link"}
+_JOG = Envelope(
+    "publish", {"topic": "/servo_node/delta_twist_cmds"}, {"header": _HEADER, "twist": _STILL}
+)
+_LEVER = Envelope(
+    "publish",
+    {"topic": "/servo_node/delta_joint_cmds"},
+    {
+        "header": _HEADER,
+        "joint_names": [
+            *("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint"),
+            *("wrist_1_joint", "wrist_2_joint", "wrist_3_joint"),
+        ],
+        "displacements": [],
+        "velocities": [0] * 6,
+        "duration": 0,
+    },
+)
 _SWIMMERS = ("amphibot-ii", "amphibot-iii", "salamandra-i", "salamandra-ii")
 
 _OPENING = (25, 2, 3, 2)
@@ -50,6 +69,9 @@ STOPS: dict[tuple[str, str], Fed] = {
     ("roveo-mini", "drive"): "DRIVE 0 0",
     # geometry_msgs/Twist: all zeros
     **{(name, "drive"): _TWIST for name in _ROS},
+    # moveit_servo: zeros are a command to stand still
+    ("ur-ros2", "jog"): _JOG,
+    ("ur-ros2", "jog_joints"): _LEVER,
     # remregs: write of 32 bits is 6 << 2, with two bits of the address, then 0.0 as IEEE 754
     **{(name, "swim"): bytes.fromhex("19 10 00 00 00 00") for name in _SWIMMERS},
     **{(name, "steer"): bytes.fromhex("19 11 00 00 00 00") for name in _SWIMMERS},

@@ -48,25 +48,37 @@ SWIMMERS = ("amphibot-ii", "amphibot-iii", "salamandra-i", "salamandra-ii")
 ORDER = {
     "tello": ["enter", "takeoff", "move", "turn", "fly", "land", "emergency", "takeoff"],
     "create-2": ["start", "full", "dock", "safe"],
+    "spot": ["claim", "power_on", "stand"],
     "ardupilot-rover": ["heartbeat", "set_mode", "arm"],
     "ur-e-series": ["power_on", "brake_release", "load", "play", "pause", "stop"],
+    "ur-ros2": [
+        *("to_servo", "take_twists", "run_servo", "jog", "take_joints", "jog_joints"),
+        *("pause_servo", "to_goals"),
+    ],
     **{name: ["start", "swim", "steer"] for name in SWIMMERS},
 }
 """What must come before the other commands, which follow as they are declared."""
-LAST = {"ur-e-series": ["power_off"]}
+LAST = {name: ["power_off"] for name in ("spot", "ur-e-series", "ur-ros2")}
 NAVIGATION = {"navigate", "stop_navigation", "place", "follow", "stop_route"}
 """Commands for Nav2, which `tests.e2e.test_navigation` gives on the map."""
 WITHOUT = {
     "generic-ros2": NAVIGATION,
+    "turtlebot3": NAVIGATION,
+    "ur-ros2": {"move", "cancel", "go_back", "tool_mode", "joint_mode", "goal_mode"},
     "turtlebot4": {"stop_docking", "stop_undocking", *NAVIGATION},
 }
 """Commands that are not given here. The docking of an emulated robot ends at once, and what has
-ended cannot be given up."""
+ended cannot be given up. The goals of an arm take a list, and its sequences are buttons."""
 ON_THE_WAY = {"plan", "plan_frame", "map_plan", "goal_x", "goal_y", "waypoint"}
 LOCALISED = {"floor", "costs", "covariance", "footprint", "particles"}
 PLACED = {"frames", "map_pose", "map_laser", "first_ray"}
-SILENT = {"turtlebot4": ON_THE_WAY, "generic-ros2": ON_THE_WAY | LOCALISED | PLACED}
-"""Signals without a value: no goal is given, and the setting for Nav2 is off by default."""
+SILENT = {
+    "turtlebot4": ON_THE_WAY,
+    "ur-ros2": {"kept"},
+    **dict.fromkeys(("generic-ros2", "turtlebot3"), ON_THE_WAY | LOCALISED | PLACED),
+}
+"""Signals without a value: no goal is given, no position is remembered, and the setting for Nav2 is
+off by default."""
 
 
 class Stick(NamedTuple):
@@ -98,12 +110,19 @@ STICKS = {
     "ardupilot-rover": Stick("Drive", ".joystick-pad", "sticks", "longitude", least=1e-5),
     "create-2": Stick("Drive", ".joystick-pad", "wheels", "left_ticks"),
     "roveo-mini": Stick("Drive", ".joystick-pad", "drive", "speed"),
+    "spot": Stick("Drive", ".joystick-pad", "drive", "x", sees="picture"),
+    "ur-ros2": Stick("Tool", ".joystick-pad", "jog", "tool_x", least=0.02),
     "tello": Stick("Height, turn", ".joystick-pad", "fly", "height"),
 }
 READY: dict[str, dict[str, Mapping[str, Reading]]] = {
     "absolem": {"enable": {"motors": True}, "set_brake": {"brake": False}},
     "ardupilot-rover": {"set_mode": {"mode": 0}},
+    "spot": {"power_on": {}, "stand": {}},
     "turtlebot3": {"motors": {"power": True}},
+    "ur-ros2": {
+        **{name: {} for name in ("power_on", "brake_release", "play")},
+        **{name: {} for name in ("to_servo", "take_twists", "run_servo")},
+    },
     **{name: {"start": {}} for name in SWIMMERS},
 }
 """What must be given last, so that it can be driven."""

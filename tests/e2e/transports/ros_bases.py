@@ -23,12 +23,13 @@ from bench.rig.ros_messages import ROS2, RandomMessages
 from tests.e2e.ports import free_port
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot, definition
 from tests.e2e.transports.peers.zenoh import other_program
+from tests.e2e.transports.ros_zenoh_robot import TREE, transform
 from urc.config.load import load_profile
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.settings import resolve_settings
 from urc.simulator.server import serve
 
-__all__ = ["BASES", "Base", "STAMPED", "messages", "open_base"]
+__all__ = ["BASES", "Base", "CLOCK", "STAMPED", "messages", "open_base"]
 
 BASES = ("rosbridge", "foxglove", "zenoh")
 STAMPED = "geometry_msgs/msg/TwistStamped"
@@ -40,6 +41,9 @@ TOPICS = {
     "/map": "nav_msgs/msg/OccupancyGrid",
 }
 START_S = 30.0
+CLOCK = (77, 5)
+"""Seconds and nanoseconds of the base's simulated time, which stands still."""
+_CLOCK = "rosgraph_msgs/msg/Clock"
 EMULATED = """
 urc: 1
 kind: robot
@@ -55,6 +59,7 @@ driver:
       camera: { subscribe: { topic: /camera/image_raw/compressed, type: sensor_msgs/CompressedImage }, json: { picture: data } }
 simulator:
   ros:
+    - { name: clock, every: 100ms, send: { publish: { topic: /clock, type: rosgraph_msgs/Clock, json: { clock: { sec: 77, nanosec: 5 } } } } }
     - { name: camera, every: 500ms, send: { publish: { topic: /camera/image_raw/compressed, json: { format: jpeg, data: JPEG } } } }
 """  # noqa: E501
 
@@ -66,8 +71,12 @@ def picture() -> bytes:
     return made.getvalue()
 
 
-def messages() -> dict[str, tuple[str, bytes]]:
-    """Return the type and the CDR bytes of one message of each topic."""
+def messages(prefix: str = "") -> dict[str, tuple[str, bytes]]:
+    """Return the type and the CDR bytes of one message of each topic.
+
+    With a `prefix` such as ``/robot1``, all topics but the map have it. The transform from map to
+    odom is then a message, too, and the simulated time `CLOCK`.
+    """
     random = RandomMessages(ROS2, seed=5)
     made: dict[str, Any] = {topic: random.message(kind) for topic, kind in TOPICS.items()}
     pose = made["/odom"].pose.pose
@@ -84,10 +93,18 @@ def messages() -> dict[str, tuple[str, bytes]]:
     grid.info.origin.orientation = turn
     image = made["/camera/image_raw/compressed"]
     image.format, image.data = "jpeg", np.frombuffer(picture(), np.uint8)
-    return {
+    said = {
         topic: (kind, bytes(ROS2.serialize_cdr(made[topic], kind)))
         for topic, kind in TOPICS.items()
     }
+    if not prefix:
+        return said
+    said["/tf"] = (TREE, transform("map", "odom", 10.0))
+    time = ROS2.types["builtin_interfaces/msg/Time"](sec=CLOCK[0], nanosec=CLOCK[1])
+    clock = ROS2.types[_CLOCK](clock=time)
+    said["/clock"] = (_CLOCK, bytes(ROS2.serialize_cdr(clock, _CLOCK)))
+    shared = ("/map", "/clock")
+    return {topic if topic in shared else prefix + topic: one for topic, one in said.items()}
 
 
 class Base:
@@ -96,6 +113,8 @@ class Base:
     def __init__(self, line: str, port: int) -> None:
         self.line, self.port = line, port
         self.speeds: list[float] = []
+        self.stamps: list[tuple[int, int]] = []
+        """Time in each command, as seconds and nanoseconds."""
         self.unread = 0
         """Number of commands of another type."""
 
@@ -107,39 +126,42 @@ class Base:
             self.unread += 1
         else:
             self.speeds.append(message.twist.linear.x)
+            stamp = message.header.stamp
+            self.stamps.append((stamp.sec, stamp.nanosec))
 
 
 @asynccontextmanager
-async def open_base(line: str, folder: Path) -> AsyncIterator[Base]:
-    """Run a base behind the connection `line`, which is one of `BASES`."""
+async def open_base(line: str, folder: Path, prefix: str = "") -> AsyncIterator[Base]:
+    """Run a base behind the connection `line`, which is one of `BASES`; see `messages`."""
     opened = {"rosbridge": _emulated, "foxglove": _foxglove, "zenoh": _zenoh}[line]
-    async with opened(folder) as base:
+    async with opened(folder, prefix) as base:
         yield base
 
 
 @asynccontextmanager
-async def _foxglove(folder: Path) -> AsyncIterator[Base]:
+async def _foxglove(folder: Path, prefix: str) -> AsyncIterator[Base]:
     robot = FoxgloveRobot()
     base = Base("foxglove", robot.port)
     schema = Schema(name=STAMPED, encoding="ros2msg", data=definition(STAMPED).encode())
-    channel = Channel("/cmd_vel", message_encoding="cdr", schema=schema, context=robot.context)
+    driven = f"{prefix}/cmd_vel"
+    channel = Channel(driven, message_encoding="cdr", schema=schema, context=robot.context)
     graph = ConnectionGraph()
-    graph.set_subscribed_topic("/cmd_vel", ["/base"])
-    for topic in TOPICS:
+    graph.set_subscribed_topic(driven, ["/base"])
+    said = messages(prefix)
+    for topic in said:
         graph.set_published_topic(topic, ["/base"])
-    said = messages()
 
     async def publish() -> None:
         count = 0
         while True:
             for topic, (kind, data) in said.items():
-                if topic in ("/odom", "/scan") or count % 10 == 0:
+                if topic.endswith(("/odom", "/scan")) or count % 10 == 0:
                     robot.publish(topic, kind, data)
             if count % 10 == 0:
                 robot.server.publish_connection_graph(graph)
             while robot.heard:
                 topic, data = robot.heard.pop(0)
-                if topic == "/cmd_vel":
+                if topic == driven:
                     base.hear(data)
             count += 1
             await asyncio.sleep(0.05)
@@ -156,10 +178,10 @@ async def _foxglove(folder: Path) -> AsyncIterator[Base]:
 
 
 @asynccontextmanager
-async def _zenoh(folder: Path) -> AsyncIterator[Base]:
+async def _zenoh(folder: Path, prefix: str) -> AsyncIterator[Base]:
     base = Base("zenoh", free_port())
     module = "tests.e2e.transports.ros_zenoh_base"
-    async with other_program(module, str(base.port)) as process:
+    async with other_program(module, str(base.port), prefix) as process:
         assert process.stdout is not None
         output = process.stdout
         async with asyncio.timeout(START_S):
@@ -182,22 +204,27 @@ async def _zenoh(folder: Path) -> AsyncIterator[Base]:
 
 
 @asynccontextmanager
-async def _emulated(folder: Path) -> AsyncIterator[Base]:
+async def _emulated(folder: Path, prefix: str) -> AsyncIterator[Base]:
     file = folder / "emulated-rover.yaml"
     file.write_text(EMULATED.replace("JPEG", base64.b64encode(picture()).decode()))
     profile = load_profile(str(file), built_in_catalog())
     base = Base("rosbridge", free_port())
     given = {"port": str(base.port), "navigation": "true"}
+    given |= {"namespace": prefix, "map": "/map"} if prefix else {}
     settings, _ = resolve_settings(profile, given)
     async with serve(profile, settings), connect(f"ws://127.0.0.1:{base.port}") as socket:
-        said = {"op": "subscribe", "topic": "/cmd_vel", "type": STAMPED}
+        driven = f"{prefix}/cmd_vel"
+        said = {"op": "subscribe", "topic": driven, "type": STAMPED}
         await socket.send(json.dumps(said))
 
         async def listen() -> None:
             async for frame in socket:
                 told = json.loads(frame)
-                if told.get("topic") == "/cmd_vel":
+                if told.get("topic") == driven:
                     base.speeds.append(told["msg"]["twist"]["linear"]["x"])
+                    stamp = told["msg"]["header"]["stamp"]
+                    if stamp != "now":  # the bridge itself inserts its time
+                        base.stamps.append((stamp["sec"], stamp["nanosec"]))
 
         task = asyncio.create_task(listen())
         try:

@@ -1,4 +1,4 @@
-"""The base of `ros_bases` on Zenoh, as a separate program: ``python -m … PORT``.
+"""The base of `ros_bases` on Zenoh, as a separate program: ``python -m … PORT PREFIX``.
 
 The wheel provides the router, the publishers and the subscription; rosbags encodes the messages.
 """
@@ -20,10 +20,11 @@ EVERY_S = 0.05
 def main() -> None:
     session = zenoh.open(router_config(int(sys.argv[1]), timestamping={"enabled": True}))
     robot = Robot(session, "jazzy")
-    said = messages()
+    prefix = sys.argv[2]
+    said = messages(prefix)
     keys = {topic: robot.token("MP", topic[1:], kind, "::,5:,:,:,,") for topic, (kind, _) in
             said.items()}  # fmt: skip
-    robot.told("cmd_vel", STAMPED)
+    robot.told(f"{prefix}/cmd_vel"[1:], STAMPED)
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
     say(kind="ready")
@@ -32,7 +33,7 @@ def main() -> None:
         count += 1
         told = z_serialize((Int64(count), Int64(time.time_ns()), GID))
         for topic, (_, data) in said.items():
-            if topic in ("/odom", "/scan") or count % 10 == 0:
+            if topic.endswith(("/odom", "/scan")) or count % 10 == 0:
                 session.put(keys[topic], data, attachment=told)
 
 

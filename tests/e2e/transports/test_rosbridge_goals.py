@@ -4,19 +4,24 @@ import asyncio
 import json
 import os
 import signal
+import sys
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import pytest
 from websockets.asyncio.client import connect
+from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
 
 from tests.e2e.transports.leaks import nothing_left
 from urc.config.load import load_profile
 from urc.guard.pipe_channel import PipeChannel
 from urc.model.profile import Profile
 from urc.runtime.registries import built_in_catalog
-from urc.runtime.session import CommandFailed, Session
+from urc.runtime.session import CommandFailed, Motion, Session
 from urc.simulator.server import serve as serve_robot
 from urc.transports.ros import choice
 
@@ -90,7 +95,7 @@ async def test_stop_ends_a_goal_that_outlived_its_connection(
                         break
                     await asyncio.sleep(0.1)
             await until(session, lambda: value(session, "going") is False)
-            assert not [note.text for note in session.hub.notes if "is cancelled" in note.text]
+            await answered(session, 0)
 
 
 async def test_a_cancellation_that_the_bridge_drops_is_repeated_on_the_same_connection(
@@ -117,7 +122,7 @@ async def test_a_cancellation_that_the_bridge_drops_is_repeated_on_the_same_conn
                 await docking
             assert session.hub.links["ros"].state == "live"
             await until(session, lambda: value(session, "going") is False)
-            assert session.goals.answer("ros", "/dock", since) == "answered"
+            await answered(session, since)
 
 
 async def test_stop_ends_a_goal_that_was_sent_to_another_port_of_the_robot(
@@ -197,8 +202,192 @@ async def test_stop_ends_a_goal_that_was_started_through_a_guard_that_was_killed
                 assert value(session, "going") is True
                 await session.command("stop_docking", {})
             await until(session, lambda: value(session, "going") is False)
-            # The result went to the lost connection, so it is not known whether the goal ended.
-            assert session.goals.answer("ros", "/dock", 0) == "owed"
+            await answered(session, 0)
+
+
+@pytest.mark.parametrize("motion", ["none", "guarded"])
+async def test_stop_ends_a_goal_of_another_program_or_of_an_earlier_server(
+    tmp_path: Path, motion: Motion
+) -> None:
+    """URC knows no id. The sender is a client of the bridge that does not exist any more."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(GUARDED)
+    rover = load_profile(path, built_in_catalog())
+    goal = {"op": "send_action_goal", "id": "g1", "action": "/dock", "action_type": "a/Dock"}
+    async with nothing_left(), emulated(rover) as port:
+        async with connect(f"ws://127.0.0.1:{port}") as other:
+            await other.send(json.dumps({**goal, "args": {}}))
+            await other.send(json.dumps({"op": "call_service", "service": "/rosapi/topics"}))
+            await other.recv()
+        settings = {"host": "127.0.0.1", "port": port}
+        transports = built_in_catalog().transports
+        async with Session(rover, settings, transports, motion=motion) as session:
+            await until(session, lambda: value(session, "going") is True)
+            since = session.goals.number
+            await session.command("stop_docking", {})
+            await until(session, lambda: value(session, "going") is False)
+            await answered(session, since)
+
+
+class CancelService:
+    """The hidden service of /dock, offered by roslibpy; the emulated bridge passes the calls on."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self.requests: list[Any] = []
+        self._process = process
+        self._ready = asyncio.Event()
+
+    async def listen(self) -> None:
+        """Keep the requests."""
+        assert self._process.stdout is not None
+        async for line in self._process.stdout:
+            if line.strip() == b"ready":
+                self._ready.set()
+            else:
+                self.requests.append(json.loads(line))
+
+    async def reply(self, reply: dict[str, Any] | None) -> None:
+        """Set the reply to later requests; None lets the service fail."""
+        assert self._process.stdin is not None
+        self._ready.clear()
+        self._process.stdin.write(json.dumps(reply).encode() + b"\n")
+        async with asyncio.timeout(WAIT_S):
+            await self._ready.wait()
+
+    async def asked(self, count: int) -> None:
+        """Wait for a number of requests."""
+        await holds(lambda: len(self.requests) >= count)
+
+
+@asynccontextmanager
+async def cancel_service(port: int) -> AsyncIterator[CancelService]:
+    script = Path(__file__).parent / "clients" / "roslibpy_cancel_service.py"
+    process = await asyncio.create_subprocess_exec(
+        sys.executable,
+        str(script),
+        str(port),
+        stdin=asyncio.subprocess.PIPE,
+        stdout=asyncio.subprocess.PIPE,
+    )
+    service = CancelService(process)
+    listening = asyncio.create_task(service.listen())
+    try:
+        yield service
+    finally:
+        process.kill()
+        await process.wait()
+        await listening
+
+
+REPLIES: dict[str, dict[str, Any] | None] = {
+    "failure": None,
+    "refusal": {"return_code": 1, "goals_canceling": []},
+    "nonsense": {"return_code": "yes"},
+}
+
+
+@pytest.mark.parametrize("reply", REPLIES)
+async def test_the_cancellation_of_all_goals_is_repeated_until_the_robot_answers(
+    tmp_path: Path, reply: str
+) -> None:
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER)
+    rover = load_profile(path, built_in_catalog())
+    async with nothing_left(), emulated(rover) as port, cancel_service(port) as robot:
+        await robot.reply(REPLIES[reply])
+        settings = {"host": "127.0.0.1", "port": port}
+        async with Session(rover, settings, built_in_catalog().transports) as session:
+            await until(session, lambda: value(session, "going") is False)
+            since = session.goals.number
+            await session.command("stop_docking", {})
+            await robot.asked(3)
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            await robot.reply({"return_code": 0, "goals_canceling": []})
+            await answered(session, since)
+            assert robot.requests == [{}] * len(robot.requests), "omitted fields are zero"
+            count = len(robot.requests)
+            await asyncio.sleep(1.5)
+            assert len(robot.requests) == count
+
+
+async def test_a_cancellation_without_an_answer_delays_neither_stops_nor_a_new_goal(
+    tmp_path: Path,
+) -> None:
+    """Up to rosbridge 2.1, a service call blocks the connection that made it."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(GUARDED)
+    rover = load_profile(path, built_in_catalog())
+    async with nothing_left(), emulated(rover) as port, one_by_one(port) as (near, blocked):
+        settings = {"host": "127.0.0.1", "port": near}
+        async with Session(rover, settings, built_in_catalog().transports) as session:
+            await until(session, lambda: value(session, "going") is False)
+            since = session.goals.number
+            await session.command("stop_docking", {})
+            await holds(lambda: bool(blocked))
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            docking = asyncio.create_task(session.command("dock", {}))
+            await until(session, lambda: value(session, "going") is True)
+            await session.command("stop_docking", {})
+            with pytest.raises(CommandFailed, match="the action was cancelled"):
+                await docking
+            await until(session, lambda: value(session, "going") is False)
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            assert session.hub.links["ros"].state == "live"
+
+
+@asynccontextmanager
+async def one_by_one(port: int) -> AsyncIterator[tuple[int, list[str]]]:
+    """Stand before a bridge that never answers a cancellation, and then reads nothing more.
+
+    Yields the near port and the calls that block their connections.
+    """
+    blocked: list[str] = []
+
+    async def meet(near: ServerConnection) -> None:
+        async with connect(f"ws://127.0.0.1:{port}") as far:
+
+            async def back() -> None:
+                async for frame in far:
+                    await near.send(frame)
+
+            returning = asyncio.create_task(back())
+            with suppress(ConnectionClosed):
+                async for frame in near:
+                    service = str(json.loads(frame).get("service"))
+                    if service.endswith("/cancel_goal"):
+                        blocked.append(service)
+                        await near.wait_closed()
+                        break
+                    await far.send(frame)
+            returning.cancel()
+
+    async with serve(meet, "127.0.0.1", 0) as server:
+        yield next(iter(server.sockets)).getsockname()[1], blocked
+
+
+async def test_the_emulated_bridge_ends_the_goals_of_all_clients_for_a_zero_id_only(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER)
+    goal = {"op": "send_action_goal", "id": "g1", "action": "/dock", "action_type": "a/Dock"}
+    call = {"op": "call_service", "id": "c", "service": "/dock/_action/cancel_goal"}
+    async with nothing_left(), emulated(load_profile(path, built_in_catalog())) as port:
+        url = f"ws://127.0.0.1:{port}"
+        async with connect(url) as one, connect(url) as other, asyncio.timeout(WAIT_S):
+            await one.send(json.dumps({**goal, "args": {}}))
+            uuid = {"goal_info": {"goal_id": {"uuid": [0] * 15 + [1]}}}
+            await other.send(json.dumps({**call, "args": uuid}))
+            assert json.loads(await other.recv())["values"]["return_code"] == 2
+            await other.send(json.dumps({**call, "args": {}}))
+            said = json.loads(await other.recv())
+            assert (said["result"], said["values"]["return_code"]) == (True, 0)
+            (listed,) = said["values"]["goals_canceling"]
+            assert len(listed["goal_id"]["uuid"]) == 16
+            result = json.loads(await one.recv())
+            assert (result["op"], result["id"], result["status"]) == ("action_result", "g1", 5)
+            await other.send(json.dumps({**call, "service": "/fly/_action/cancel_goal"}))
+            assert json.loads(await other.recv())["result"] is False
 
 
 async def test_the_emulated_bridge_takes_a_cancel_from_any_client_but_no_unknown_id(
@@ -224,6 +413,18 @@ async def test_the_emulated_bridge_takes_a_cancel_from_any_client_but_no_unknown
             with pytest.raises(TimeoutError):
                 async with asyncio.timeout(0.3):
                     await other.recv()
+
+
+async def answered(session: Session, since: int) -> None:
+    """Wait until the robot has answered the cancellation, as STOP does."""
+    await holds(lambda: session.goals.answer("ros", "/dock", since) == "answered")
+
+
+async def holds(is_so: Callable[[], bool]) -> None:
+    ends_s = time.monotonic() + WAIT_S
+    while not is_so():
+        assert time.monotonic() < ends_s
+        await asyncio.sleep(0.02)
 
 
 async def until(session: Session, fits: Callable[[], bool]) -> None:

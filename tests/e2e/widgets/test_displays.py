@@ -284,7 +284,7 @@ async def test_a_table_shows_whole_rows_and_how_many_follow(new_page: PageMaker)
             )
             seen = await page.evaluate(WHOLE_ROWS)
             assert seen["cut"] == []
-            assert await page.inner_text(".table-more") == f"▾ +{40 - seen['whole']} more"
+            assert await page.inner_text(".table-more") == f"▾ {40 - seen['whole']} more"
         await page.eval_on_selector(".table-scroll", "(el) => el.scrollTo(0, el.scrollHeight)")
         await until_text(page, ".table-more", "")
         robot.set_reading("report", {"part 1": "ok"})

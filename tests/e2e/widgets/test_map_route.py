@@ -15,7 +15,7 @@ from tests.e2e.dashboards import running_dashboard, until, until_attribute, unti
 from tests.e2e.motion.driving import STOP, centre
 from tests.e2e.widgets.test_map import AT, POSE, drag
 from urc.model.driver import Argument, Command
-from urc.model.interface import WidgetUse
+from urc.model.interface import OutputBinding, WidgetUse
 from urc.model.payload import WriteSpec
 from urc.model.values import Reading, Signal
 from urc.protocol.events import Replied
@@ -255,19 +255,69 @@ async def test_a_route_that_goes_on_after_pause_can_be_ended_again(new_page: Pag
         await until_text(page, ".map-words", "Paused · Waypoints left: 2")
 
 
-async def test_a_route_is_ended_after_a_reload_and_from_another_screen(
+@pytest.mark.parametrize("opened", ["by a reload", "by another screen"])
+@pytest.mark.parametrize("name", ["Pause", "Clear"])
+async def test_a_page_that_is_opened_later_shows_the_route_and_ends_it(
+    new_page: PageMaker, opened: str, name: str
+) -> None:
+    """The server holds the points; the present waypoint of an earlier route does not count."""
+    page = await new_page(size="desktop")
+    async with followed(page) as robot:
+        robot.set_reading("waypoint", 2)  # of an earlier route
+        await drawn(page, (1, 0), (2, 0), (3, 1))
+        await sent(page, robot)
+        await until_text(page, ".map-words", "On the way to waypoint 1 of 3")
+        later = page if opened == "by a reload" else await new_page(size="desktop")
+        await later.goto(page.url)
+        words = later.locator(".map-words")
+        await expect(words).to_contain_text(re.compile("On the way to waypoint 1 of 3 · screen 1"))
+        await expect(later.locator(".map-mark")).to_have_text(["1", "2", "3"])
+        robot.set_reading("waypoint", 1)
+        await expect(later.locator(".map-mark")).to_have_text(["2", "3"])
+        await expect(button(later, "End route")).to_be_hidden()
+        await press(later, name)
+        await until(lambda: robot.commands[1:] == [("end", {})])
+        if name == "Pause":
+            await until_text(later, ".map-words", "Paused · Waypoints left: 2")
+            await press(later, "Continue …")
+            await press(later, "Send")
+            await until(lambda: len(robot.routes) == 2)
+            assert robot.routes[1]["xs"] == pytest.approx([2, 3], abs=0.1)
+        else:
+            await until_attribute(later, ".map-bar", "hidden", "")
+            await expect(later.locator(".map-mark")).to_have_count(0)
+
+
+async def test_a_route_of_another_screen_disappears_when_it_ends(new_page: PageMaker) -> None:
+    page, other = await new_page(size="desktop"), await new_page(size="desktop")
+    async with followed(page) as robot:
+        await other.goto(page.url)
+        await until_text(other, ".map-text", "x 0.00 m, y 0.00 m")
+        await drawn(page, (1, 0), (2, 0))
+        await sent(page, robot)
+        await expect(other.locator(".map-words")).to_contain_text("waypoint 1 of 2")
+        assert robot.way is not None
+        robot.way.set_result(None)
+        await until_attribute(other, ".map-bar", "hidden", "")
+        await expect(other.locator(".map-mark")).to_have_count(0)
+        await expect(page.locator(".map-words")).to_have_text(re.compile("✓"))
+
+
+async def test_after_a_new_session_a_route_is_ended_by_the_robots_feedback(
     new_page: PageMaker,
 ) -> None:
-    """The robot's feedback tells of the route; its end needs newer feedback to be doubted."""
+    """As after a restart of the server, nobody knows the points; nothing false is shown."""
     page = await new_page(size="desktop")
     async with followed(page) as robot:
         await drawn(page, (1, 0), (2, 0))
         await sent(page, robot)
-        robot.set_reading("waypoint", 1)
-        await until_text(page, ".map-words", "On the way to waypoint 2 of 2")
-        await expect(button(page, "End route")).to_be_hidden()
-        await page.reload()
-        await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+        url = page.url
+        await page.goto("about:blank")
+        await until(lambda: not robot.is_open)
+        await page.goto(url)
+        await until(lambda: robot.is_open)
+        await until_attribute(page, ".map-bar", "hidden", "")
+        await expect(page.locator(".map-mark")).to_have_count(0)
         robot.set_reading("waypoint", 1)
         await until_text(page, ".map-words", "On the way to waypoint 2")
         await press(page, "End route")
@@ -275,6 +325,52 @@ async def test_a_route_is_ended_after_a_reload_and_from_another_screen(
         await expect(button(page, "End route")).to_be_hidden()
         robot.set_reading("waypoint", 1)
         await expect(button(page, "End route")).to_be_visible()
+
+
+class Goer(Follower):
+    """A robot whose goal ends as a route does."""
+
+    async def command(self, name: str, arguments: Mapping[str, Reading], **more: Any) -> Replied:
+        if name != "go":
+            return await super().command(name, arguments, **more)
+        reply = await FakeRobot.command(self, name, arguments, **more)
+        self.way = asyncio.get_running_loop().create_future()
+        await self.way
+        return reply
+
+
+async def test_every_page_shows_and_cancels_a_single_goal(new_page: PageMaker) -> None:
+    page, other = await new_page(size="desktop"), await new_page(size="desktop")
+    use = WidgetUse(
+        "m",
+        "map",
+        AT,
+        {"goto": "go", "end_goal": "end"},
+        given={"goto": OutputBinding({"to_x": "x", "to_y": "y"})},
+    )
+    numbers = {name: Argument(name, "number") for name in ("to_x", "to_y")}
+    commands = {**COMMANDS, "go": Command("go", "wire", WriteSpec("text"), numbers, moves=True)}
+    robot = Goer(dashboard_profile(signals=SIGNALS, uses=[use], commands=commands))
+    async with running_dashboard(robot) as address:
+        for one in (page, other):
+            await one.goto(f"{address}robots/puppet/")
+            await until(lambda: robot.is_open)
+            for name, value in (("px", 0.0), ("py", 0.0), ("turned", 0.0)):
+                robot.set_reading(name, value)
+            await until_text(one, ".map-text", "x 0.00 m, y 0.00 m")
+        x, y = await centre(page, ".map-area")
+        await page.mouse.click(x + 64, y - 32)
+        await press(page, "Go there")
+        told = re.compile(r"On the way to x 2.0\d m, y 1.0\d m")
+        await expect(page.locator(".map-words")).to_have_text(told)
+        await expect(other.locator(".map-words")).to_have_text(
+            re.compile(told.pattern + " · screen 1")
+        )
+        await press(other, "Cancel goal")
+        await until(lambda: [name for name, _ in robot.commands] == ["go", "end"])
+        await expect(page.locator(".map-words")).to_contain_text("the action was cancelled")
+        await expect(button(page, "Cancel goal")).to_be_hidden()
+        await expect(button(other, "Cancel goal")).to_be_hidden()
 
 
 async def test_escape_is_stop_while_a_route_is_under_way_even_with_a_choice_on_the_map(

@@ -1,5 +1,6 @@
 """What the widgets that look at the world show: values pushed, pixels and words seen."""
 
+import re
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -260,6 +261,8 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
         await until_text(page, ".map-text", "46°31′12.0″ N, 6°34′12.0″ E")
         turn = "document.querySelector('.map-arrow').style.transform"
         await page.wait_for_function(f"() => {turn} === 'rotate(90deg)'")
+        await until_text(page, ".map-heading", "· heading 090°")
+        await expect(page.locator(".map-north")).to_be_visible()
         area = page.locator(".map-area")
         await area.focus()
         await page.keyboard.press("Enter")
@@ -298,6 +301,33 @@ async def test_a_place_on_the_map_is_asked_for_before_it_is_sent(new_page: PageM
         assert await page.get_by_role("button", name="Go there").is_disabled()
         await page.keyboard.press("Escape")
         await page.wait_for_selector(".map[data-mode='look']")
+
+
+async def test_a_trail_is_cleared_by_its_button_and_by_a_jump_of_the_position(
+    new_page: PageMaker,
+) -> None:
+    """There is nothing to clear before the robot has moved."""
+    signals = {name: Signal(name, "number", unit="m", stale_after_s=60) for name in ("px", "py")}
+    page = await new_page(size="desktop")
+    async with shown(page, signals, WidgetUse("m", "map", {"x": "px", "y": "py"})) as robot:
+        clear = page.get_by_role("button", name="Clear the trail")
+
+        async def move(x: float) -> None:
+            robot.set_reading("px", x)
+            await until_text(page, ".map-text", f"x {x:.2f} m, y 0.00 m")
+
+        robot.set_reading("py", 0.0)
+        await move(0.0)
+        await expect(page.locator(".map-north")).to_be_hidden()
+        await expect(page.locator(".map-bar-length")).to_have_text(re.compile(r"^[125]0*\.?0? m$"))
+        await expect(clear).to_be_hidden()
+        await move(0.5)
+        await clear.click()
+        await expect(clear).to_be_hidden()
+        await move(1.0)
+        await expect(clear).to_be_visible()
+        await move(500.0)
+        await expect(clear).to_be_hidden()
 
 
 async def test_a_map_of_a_floor_has_metres(new_page: PageMaker) -> None:

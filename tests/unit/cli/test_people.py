@@ -6,7 +6,8 @@ import os
 import re
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -46,8 +47,9 @@ def urc(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> AccessStore:
-    return AccessStore(tmp_path)
+def store(tmp_path: Path) -> Iterator[AccessStore]:
+    with closing(AccessStore(tmp_path)) as opened:
+        yield opened
 
 
 def listed(urc: Run, what: str, *words: str) -> list[dict[str, object]]:

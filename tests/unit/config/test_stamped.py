@@ -8,6 +8,10 @@ import pytest
 from tests.unit.config.folder import ROOT, Folder, head
 from urc.config.load import check
 from urc.config.parse.widget import WidgetFolder
+from urc.model.payload import WriteSpec
+from urc.protocol.forms.table import build_writer
+from urc.protocol.forms.topics import published
+from urc.protocol.values.payload import CodecContext, Frame
 from urc.runtime.document_tests import exercise
 from urc.runtime.registries import built_in_catalog
 
@@ -46,6 +50,67 @@ def test_a_stamped_message_has_a_header_and_its_field(
     checked = folder.check("rover")
     assert checked.profile is not None, checked.problems
     assert exercise(checked.profile).problems == []
+
+
+CHOSEN = """
+settings: { new: { type: boolean, default: false } }
+tests:
+  - name: plain
+    run: drive
+    args: { x: 0.5 }
+    sent: { ros: { publish: { topic: /cmd_vel, type: geometry_msgs/Twist, json: PLAIN } } }
+  - name: stamped
+    settings: { new: true }
+    run: drive
+    args: { x: 0.5 }
+    sent: { ros: { publish: { topic: /cmd_vel, type: geometry_msgs/TwistStamped, json: BODY } } }
+"""
+
+
+def choosing(expression: str) -> str:
+    """Return a rover that chooses between the two types."""
+    command = DRIVE.replace("TYPE", "geometry_msgs/Twist").partition("tests:")[0]
+    command = command.replace("stamped: true", f"stamped: {expression}")
+    tests = CHOSEN.replace("BODY", BODY.replace("FIELD", "twist"))
+    tests = tests.replace("PLAIN", "{ linear: { x: 0.5 } }")
+    return head("robot", "rover") + ROS + command + tests
+
+
+def test_a_setting_chooses_the_stamped_message(tmp_path: Path) -> None:
+    """The emulated robot reads both, and topics are compared with the chosen type."""
+    folder = Folder(tmp_path)
+    folder.write(rover=choosing("settings.new"))
+    checked = folder.check("rover")
+    assert checked.profile is not None, checked.problems
+    assert exercise(checked.profile).problems == []
+    driver = checked.profile.driver
+    for new, kind in ((False, "geometry_msgs/Twist"), (True, "geometry_msgs/TwistStamped")):
+        assert [one.type for one in published(driver, "ros", {"new": new})] == [kind]
+        write = driver.commands["drive"].send
+        assert isinstance(write, WriteSpec)
+        writer = build_writer(write, CodecContext(settings={"new": new}))
+        said = writer.write({"x": 0.25, "settings": {"new": new}})
+        assert writer.read(Frame(said, "utf-8")) == {"x": 0.25}
+
+
+@pytest.mark.parametrize(
+    ("expression", "code"),
+    [
+        ("x > 0", "unknown-name"),
+        ("settings.old", "unknown-setting"),
+        ("settings.new ==", "bad-expression"),
+        ("'{{ settings.new }}'", "bad-expression"),
+    ],
+)
+def test_an_expression_that_is_no_choice_is_refused(
+    tmp_path: Path, expression: str, code: str
+) -> None:
+    folder = Folder(tmp_path)
+    folder.write(rover=choosing(expression))
+    found = [one for one in folder.found("rover") if one.severity == "error"]
+    assert found
+    assert all("commands.drive.send.publish" in one.path for one in found)
+    assert found[0].code == code
 
 
 def test_a_type_without_a_stamped_kind_is_refused(tmp_path: Path) -> None:

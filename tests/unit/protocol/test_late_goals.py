@@ -1,4 +1,4 @@
-"""Goals that wait for their services: the conditions of their commands still count."""
+"""Goals that wait for their services: conditions, rights and STOP still count."""
 
 from pathlib import Path
 
@@ -25,6 +25,8 @@ commands:
     requires: [{ expr: door, else: The door is closed }]
     send: { goal: { action: /dock, type: my_robot_msgs/action/Dock, json: {} } }
   stay: { stop: true, send: { cancel: { action: /dock } } }
+sequences:
+  tour: { moves: true, steps: [{ run: dock }] }
 """
 TYPE = ["my_robot_msgs/action/Dock_SendGoal_Request", "json", "jsonschema", "{}"]
 
@@ -69,3 +71,42 @@ def test_goal_is_refused_if_its_condition_no_longer_holds(engine: Engine) -> Non
     assert [one for one in events if isinstance(one, Send)] == []
     failed = [one for one in events if isinstance(one, Failed)]
     assert [one.message for one in failed] == ["The door is closed"]
+
+
+def refused_with(events: list[Event]) -> list[str]:
+    """Return why the goal failed, after checking that nothing was sent."""
+    assert [one for one in events if isinstance(one, Send)] == []
+    return [one.message for one in events if isinstance(one, Failed)]
+
+
+def test_goal_is_refused_if_its_operator_may_no_longer_send_it(engine: Engine) -> None:
+    """The check runs twice: when the goal leaves the queue, and when its services are known."""
+    door(engine, True, 0.1)
+    why_not = ""
+    request = Request(1, "dock", unless=lambda: why_not)
+    waiting = returned(engine.command(request, 0.2))
+    why_not = "another screen has the controls"
+    assert refused_with(engine.receive("ros", waiting, 1.1)) == [why_not]
+    assert refused_with(engine.command(request._replace(id=2), 1.2)) == [why_not]
+
+
+def test_goal_whose_command_has_failed_meanwhile_is_never_sent(engine: Engine) -> None:
+    """Nobody would know of it."""
+    door(engine, True, 0.1)
+    waiting = returned(engine.command(Request(1, "dock"), 0.2))
+    events = engine.tick(1000.0)
+    assert [one.code for one in events if isinstance(one, Failed)] == ["timed-out"]
+    assert refused_with(engine.receive("ros", waiting, 1000.1)) == []
+
+
+def test_goal_of_a_sequence_is_refused_if_its_operator_may_no_longer_send_it(
+    engine: Engine,
+) -> None:
+    """Other steps of the sequence go on, for example those that let go of a load."""
+    door(engine, True, 0.1)
+    why_not = ""
+    request = Request(1, "tour", unless=lambda: why_not)
+    waiting = returned(engine.command(request, 0.2) + engine.tick(0.2))
+    why_not = "another screen has the controls"
+    events = engine.receive("ros", waiting, 1.1)
+    assert refused_with(events + engine.tick(1.2)) == [why_not]

@@ -3,6 +3,7 @@
 import os
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -132,7 +133,7 @@ def test_a_damaged_record_is_left_out(store: AlarmStore) -> None:
     """One of a newer version has more attributes; one of a mad version has others."""
     store.save("rover", {"battery": LOW}, [])
     assert store.settle()
-    with sqlite3.connect(store.file) as base:
+    with closing(sqlite3.connect(store.file)) as base, base:
         (text,) = base.execute("SELECT record FROM states").fetchone()
         newer = text[:-1] + ', "consequence": "It falls."}'
         for name, one in (("newer", newer), ("text", "{"), ("kind", '{"signal": 3}')):

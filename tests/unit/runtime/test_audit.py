@@ -4,6 +4,7 @@ import os
 import sqlite3
 import time
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -72,7 +73,7 @@ def test_a_changed_row_shows(kept: AuditLog) -> None:
         kept.add(entry(number))
     assert kept.settle()
     assert check(kept.file) == ""
-    with sqlite3.connect(kept.file) as base:
+    with closing(sqlite3.connect(kept.file)) as base, base:
         base.execute("UPDATE entries SET who = 'screen 2' WHERE id = 4")
     assert check(kept.file) == "entry 4 does not follow from entry 3"
 
@@ -81,7 +82,7 @@ def test_a_removed_row_shows(kept: AuditLog) -> None:
     for number in range(6):
         kept.add(entry(number))
     assert kept.settle()
-    with sqlite3.connect(kept.file) as base:
+    with closing(sqlite3.connect(kept.file)) as base, base:
         base.execute("DELETE FROM entries WHERE id = 3")
     assert check(kept.file) == "entry 3 is missing"
 

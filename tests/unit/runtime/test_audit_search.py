@@ -1,6 +1,5 @@
 """The audit is searched by robot, person, kind, text and time, page by page, within a time."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from urc.runtime.sqlite_file import open_for_writing
 
 
 @pytest.fixture(scope="module")
-def file(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("audit") / "audit.sqlite"
     with AuditLog(path) as log:
         for number, (robot, what, who, text) in enumerate(ENTRIES):
@@ -22,8 +21,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
                     place=f"192.0.2.{number}",
                 )
             )  # fmt: skip
-        assert log.settle()
-        yield path
+    return path
 
 
 ENTRIES = [

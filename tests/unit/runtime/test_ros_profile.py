@@ -37,7 +37,8 @@ def test_every_choice_of_parts_is_a_valid_profile(
     known = checked.profile.settings
     assert settings_of(base(parts, version)).keys() <= known.keys()
     assert checked.profile.title == base().title
-    assert ("picture" in checked.profile.driver.signals) == ("camera" in parts)
+    usual = "/camera/image_raw/compressed"
+    assert known["camera"].default == (usual if "camera" in parts else "")
 
 
 @pytest.mark.parametrize("lacks", ["cmd_vel", "odom"])

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from urc.model.payload import Envelope
-from urc.transports.base import NOTICE, GoalRecord, PeerClosed
+from urc.transports.base import GoalRecord, PeerClosed
 from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.rosbridge_client import RosClient
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -91,29 +91,70 @@ def test_a_cancel_is_repeated_until_the_result_arrives() -> None:
 def test_a_goal_of_the_other_kind_of_bridge_is_not_cancelled_by_its_id() -> None:
     goals = UnfinishedGoals()
     goals.add("0f" * 16, "/dock")
-    client = RosClient(queue := TopicReceiveQueue(), 2, goals)
+    client = RosClient(TopicReceiveQueue(), 2, goals)
     assert sent(client, CANCEL) == client.cancel_due() == []
-    (notice,) = told(queue)
-    assert notice.verb == NOTICE
     assert goals.owes("/dock"), "foxglove_bridge ends it later"
     sent(client, DOCK)
     assert not goals.owes("/dock"), "the new goal must not be ended"
 
 
-def test_the_results_of_all_cancelled_goals_answer_the_cancellation() -> None:
+@pytest.mark.parametrize("is_reply_first", [False, True])
+def test_the_robots_reply_and_the_results_of_all_goals_answer_the_cancellation(
+    is_reply_first: bool,
+) -> None:
+    """The reply proves nothing about a goal that the bridge has not passed on yet."""
     goals = UnfinishedGoals()
     client = RosClient(TopicReceiveQueue(), 2, goals)
     first, second = sent(client, DOCK) + sent(client, DOCK)
     sent(client, DOCK._replace(attributes={**DOCK.attributes, "action": "/undock"}))
     for action in ("/dock", "/undock"):
         sent(client, CANCEL._replace(attributes={"action": action}))
-    client.arrived(ended(first, 5), 100)
-    assert goals.owes("/dock")
-    client.arrived(ended(second, 5), 100)
+    if is_reply_first:
+        assert client.all_cancelled("/dock", True)
+        assert not client.owes("/dock"), "it need not be repeated"
+    for goal in (first, second):
+        assert goals.owes("/dock")
+        client.arrived(ended(goal, 5), 100)
+    if not is_reply_first:
+        assert client.owes("/dock")
+        assert client.all_cancelled("/dock", False)
     assert goals.owed() == ["/undock"]
 
 
-def test_without_a_known_goal_no_cancellation_is_answered() -> None:
+def test_a_reply_without_goals_is_no_answer_while_a_goal_goes_on() -> None:
+    """rclpy reports a refusal as success without goals."""
+    goals = UnfinishedGoals()
+    client = RosClient(TopicReceiveQueue(), 2, goals)
+    sent(client, DOCK)
+    sent(client, CANCEL)
+    assert not client.all_cancelled("/dock", False)
+    assert client.owes("/dock")
+
+
+def test_the_robots_reply_alone_answers_for_goals_of_earlier_connections() -> None:
+    """Their results never arrive here; the cancellations of their ids are repeated all the same."""
+    goals = UnfinishedGoals()
+    (goal,) = sent(RosClient(TopicReceiveQueue(), 2, goals), DOCK)
+    later = RosClient(TopicReceiveQueue(), 2, goals)
+    sent(later, CANCEL)
+    assert later.all_cancelled("/dock", False)
+    assert not goals.owes("/dock")
+    assert goals.cancelled() == [(goal["id"], "/dock")]
+
+
+def test_a_later_cancellation_needs_an_answer_of_its_own() -> None:
+    goals = UnfinishedGoals()
+    client = RosClient(TopicReceiveQueue(), 2, goals)
+    (goal,) = sent(client, DOCK)
+    sent(client, CANCEL)
+    assert client.all_cancelled("/dock", True)
+    sent(client, CANCEL)
+    assert client.owes("/dock")
+    client.arrived(ended(goal, 5), 100)
+    assert goals.owes("/dock")
+
+
+def test_without_the_robots_reply_no_cancellation_is_answered() -> None:
     goals = UnfinishedGoals()
     client = RosClient(TopicReceiveQueue(), 2, goals)
     (goal,) = sent(client, DOCK)
@@ -148,15 +189,13 @@ def test_the_record_reports_each_change_and_continues_in_another_process() -> No
 
 
 @pytest.mark.parametrize("status", [4, 5, 6])
-def test_an_ended_goal_is_not_cancelled_and_the_log_says_so_once(status: int) -> None:
+def test_an_ended_goal_is_not_cancelled_by_its_id(status: int) -> None:
     client = RosClient(queue := TopicReceiveQueue(), 2, UnfinishedGoals())
     (goal,) = sent(client, DOCK)
     client.arrived(ended(goal, status), 100)
     assert sent(client, CANCEL) == sent(client, CANCEL) == []
-    response, notice = told(queue)
+    (response,) = told(queue)
     assert (response.verb, response.attributes["id"]) == ("response", 7)
-    text = "no unfinished goal of /dock is known: none is cancelled"
-    assert notice == Envelope(NOTICE, {}, f"{text}, and a goal of another program goes on")
 
 
 def test_two_connections_use_different_ids() -> None:

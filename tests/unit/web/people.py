@@ -55,6 +55,10 @@ class Door:
         self.access.control.load()
         return {self.access.sign_in_cookie: secret}
 
+    def close(self) -> None:
+        """Close the file of the people."""
+        self.store.close()
+
     @contextmanager
     def browser(
         self, host: str = "192.0.2.7", cookies: Mapping[str, str] | None = None

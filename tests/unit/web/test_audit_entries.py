@@ -3,6 +3,7 @@
 import json
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -99,7 +100,7 @@ def test_no_secret_of_a_sign_in_reaches_the_log(tmp_path: Path, ann: dict[str, s
     assert check(tmp_path / "audit.sqlite") == ""
     whats = {one.what for one in entries_of(tmp_path)}
     assert {"settings", "audit"} <= whats
-    with sqlite3.connect(tmp_path / "audit.sqlite") as base:
+    with closing(sqlite3.connect(tmp_path / "audit.sqlite")) as base:
         base.execute("PRAGMA wal_checkpoint(TRUNCATE)")
     files = b"".join(one.read_bytes() for one in tmp_path.glob("audit.sqlite*"))
     text = "".join(exported(tmp_path / "audit.sqlite"))

@@ -1,7 +1,7 @@
 """Commands of pages that take long: their time limit, and what all pages are told of motion."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -9,20 +9,38 @@ import pytest
 
 from tests.unit.web.test_client import FakeLine
 from tests.unit.web.test_consent import Screens
-from urc.model.driver import Command, Reply
-from urc.model.payload import ReadSpec, WriteSpec
+from urc.model.driver import Argument, Command, Reply
+from urc.model.payload import Envelope, ReadSpec, WriteSpec
+from urc.model.role import Role
 from urc.model.values import Reading
 from urc.protocol.events import Replied
+from urc.runtime.command_failed import CommandFailed
 from urc.testing.clock import FakeClock, settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.transports.base import GoalRecord
+from urc.web.feed.client_socket import SocketPeer
 from urc.web.fleet.robots import Robot, RobotService
+from urc.web.page_socket import BrowserClient
 
 pytestmark = pytest.mark.anyio
 
 LONG = Reply(ReadSpec("regex", {"pattern": "done"}), timeout_s=60)
 COMMANDS = {
     "beep": Command("beep", "wire", WriteSpec("text")),
-    "route": Command("route", "wire", WriteSpec("text"), moves=True, reply=LONG),
+    "route": Command(
+        "route",
+        "wire",
+        WriteSpec("text"),
+        {"xs": Argument("xs", "array"), "word": Argument("word", "string")},
+        moves=True,
+        reply=LONG,
+    ),
+    "end": Command(
+        "end",
+        "wire",
+        WriteSpec("envelope", {"verb": "cancel", "attributes": {"action": "/follow"}}),
+        stops=True,
+    ),
 }
 
 
@@ -80,3 +98,241 @@ async def test_every_page_is_told_of_a_command_that_moves_the_robot_until_its_re
         await settle()
         await robot.fake.advance(1)  # to the next flush
         assert other.of_type("progress")[-1]["moving"] == []
+
+
+class Queueing(Slow):
+    """Its commands wait in a queue until the test lets them go, as in the engine."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.late: list[Callable[[], str] | None] = []
+
+    async def command(self, name: str, arguments: Mapping[str, Reading], **more: Any) -> Replied:
+        """Keep the check that the engine makes before it sends the command."""
+        self.late.append(more.get("unless"))
+        return await super().command(name, arguments, **more)
+
+    def why_not(self) -> str:
+        """Return what the engine's check now says of the last command."""
+        return [check for check in self.late if check is not None][-1]()
+
+
+@asynccontextmanager
+async def queued() -> AsyncIterator[tuple[Queueing, RobotService, FakeLine, FakeLine]]:
+    """Serve a robot on two screens; the first has sent a route, which waits in the queue."""
+    robot = Queueing()
+    service = RobotService(Robot(robot.profile, {}, robot.open), clock=robot.fake)
+    running = asyncio.create_task(service.run())
+    screens = Screens(service, robot, robot.fake)
+    first, second = await screens.come(), await screens.come()
+    first.say({"t": "run", "id": 2, "command": "route"})
+    await settle()
+    try:
+        yield robot, service, first, second
+    finally:
+        await screens.end()
+        running.cancel()
+        await settle()
+
+
+async def test_motion_that_waits_is_not_started_once_another_screen_has_the_controls() -> None:
+    async with queued() as (robot, _, _, second):
+        assert robot.why_not() == ""
+        second.say({"t": "drive", "verb": "take"})
+        await settle()
+        assert robot.why_not() == "screen 2 has the controls"
+
+
+async def test_motion_that_waits_is_not_started_after_a_stop_even_after_its_reset() -> None:
+    async with queued() as (robot, _, _, second):
+        second.say({"t": "stop"})
+        await settle()
+        assert robot.why_not() == "Stopped by screen 2. Reset to drive again."
+        second.say({"t": "drive", "verb": "reset"})
+        await settle()
+        assert robot.why_not() == "STOP was pressed meanwhile: send it again"
+
+
+async def test_motion_that_waits_is_not_started_once_its_sender_may_only_watch() -> None:
+    class Rights:
+        now: Role = "drive"
+
+        def role(self) -> Role:
+            return self.now
+
+        def may_give(self, command: str) -> bool:
+            return True
+
+    rights = Rights()
+    async with queued() as (robot, service, _, _):
+        line = FakeLine()
+        peer = SocketPeer(rights=rights)
+        serving = asyncio.create_task(BrowserClient(line, service, line, peer).serve())
+        await settle()
+        line.say({"t": "run", "id": 3, "command": "route"})
+        await settle()
+        assert robot.why_not() == ""
+        rights.now = "watch"
+        assert robot.why_not() == "this page only watches"
+        roles = [operator.client.role for operator in service.controls.operators]
+        assert roles == ["drive"] * 3, "the engine asks, so nothing may happen meanwhile"
+        line.leave()
+        await settle()
+        await serving
+
+
+async def test_motion_that_waits_is_not_started_once_its_page_is_closed() -> None:
+    async with queued() as (robot, _, first, _):
+        first.leave()
+        await settle()
+        assert "no longer waits for its reply" in robot.why_not()
+
+
+async def test_a_command_that_does_not_move_the_robot_is_not_checked_again() -> None:
+    """A command that ends motion must never be held back."""
+    async with queued() as (robot, _, first, _):
+        first.say({"t": "run", "id": 4, "command": "beep"})
+        await settle()
+        assert robot.late[-1] is None
+
+
+class Rover(Slow):
+    """A ROS robot: each route ends as the test says, and the end of the route is a cancellation."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.payloads = {
+            "route": Envelope("goal", {"action": "/follow"}, {}),
+            "end": Envelope("cancel", {"action": "/follow"}),
+        }
+        self.ways: list[asyncio.Future[None]] = []
+
+    async def command(self, name: str, arguments: Mapping[str, Reading], **more: Any) -> Replied:
+        """Reply to a route at its end, and to anything else at once."""
+        reply = await FakeRobot.command(self, name, arguments, **more)
+        if name == "route":
+            self.ways.append(asyncio.get_running_loop().create_future())
+            await self.ways[-1]
+        return reply
+
+
+@asynccontextmanager
+async def driven() -> AsyncIterator[tuple[Rover, RobotService, Screens]]:
+    robot = Rover()
+    service = RobotService(Robot(robot.profile, {}, robot.open), clock=robot.fake)
+    running = asyncio.create_task(service.run())
+    screens = Screens(service, robot, robot.fake)
+    try:
+        yield robot, service, screens
+    finally:
+        await screens.end()
+        running.cancel()
+        await settle()
+
+
+async def goals(robot: Rover, line: FakeLine) -> list[dict[str, Any]]:
+    """Return the goals that a page knows."""
+    await settle()
+    await robot.fake.advance(1)  # to the next flush
+    told: list[dict[str, Any]] = [{}, *line.of_type("progress")][-1].get("goals", [])
+    return told
+
+
+ROUTE = {"t": "run", "id": 2, "command": "route", "arguments": {"xs": [1, 2], "word": "private"}}
+
+
+async def test_a_page_that_is_opened_later_gets_the_running_route_with_its_sender_and_points() -> (
+    None
+):
+    async with driven() as (robot, _, screens):
+        first = await screens.come()
+        assert await goals(robot, first) == []
+        first.say(ROUTE)
+        await settle()
+        await robot.fake.advance(5)
+        later = await screens.come()
+        (goal,) = await goals(robot, later)
+        you = first.of_type("lease")[-1]["you"]
+        assert (goal["command"], goal["by"], goal["page"]) == ("route", "screen 1", you)
+        assert goal["places"] == {"xs": [1, 2]}
+        assert 5000 <= goal["since"] <= 7000
+        assert not goal.get("lost")
+        robot.ways[0].set_result(None)
+        assert await goals(robot, later) == await goals(robot, first) == []
+
+
+async def test_a_route_outlives_a_reload_of_its_page_until_its_reply() -> None:
+    async with driven() as (robot, _, screens):
+        first, other = await screens.come(), await screens.come()
+        first.say(ROUTE)
+        await settle()
+        first.leave()
+        assert len(await goals(robot, other)) == 1
+        again = await screens.come()
+        assert len(await goals(robot, again)) == 1
+        robot.ways[0].set_exception(CommandFailed("refused", "the action was cancelled"))
+        assert await goals(robot, again) == []
+
+
+@pytest.mark.parametrize("end", ["cancel", "stop"])
+async def test_a_route_with_an_unknown_outcome_stays_until_another_page_ends_it(end: str) -> None:
+    async with driven() as (robot, service, screens):
+        first, other = await screens.come(), await screens.come()
+        first.say(ROUTE)
+        await settle()
+        robot.ways[0].set_exception(CommandFailed("disconnected", "the connection is lost"))
+        (goal,) = await goals(robot, other)
+        assert goal["lost"]
+        assert other.of_type("progress")[-1]["moving"] == ["route"], "Escape is STOP"
+        if end == "cancel":
+            other.say({"t": "run", "id": 7, "command": "end"})
+        else:
+            other.say({"t": "stop"})
+            await settle()
+            robot.goals.changed("wire", GoalRecord((), ("/follow",)))
+            assert len(await goals(robot, other)) == 1, "the robot has not answered"
+            robot.goals.changed("wire", GoalRecord())
+            await robot.fake.advance(1)
+            assert service.controls.controller.is_certain
+        assert await goals(robot, other) == []
+
+
+async def test_the_end_of_a_session_ends_what_is_known_of_its_goals() -> None:
+    """A later session knows nothing of the route, and says nothing of it."""
+    async with driven() as (robot, _, screens):
+        first = await screens.come()
+        first.say(ROUTE)
+        await settle()
+        first.leave()
+        await settle()
+        await robot.fake.advance(10)
+        assert not robot.is_open
+        assert robot.ways[0].cancelled()
+        assert await goals(robot, await screens.come()) == []
+
+
+async def test_two_operators_one_drives_and_the_other_may_stop_and_cancel() -> None:
+    """A new goal needs that nobody else has the controls; an end of a goal does not."""
+    async with driven() as (robot, service, screens):
+        first, second = await screens.come(), await screens.come()
+        watcher = await screens.come("watch")
+        first.say({"t": "drive", "verb": "take"})
+        first.say(ROUTE)
+        second.say({**ROUTE, "id": 3})
+        watcher.say({"t": "run", "id": 4, "command": "end"})
+        await settle()
+        assert [one["message"] for one in second.of_type("reply")] == ["screen 1 has the controls"]
+        assert [one["message"] for one in watcher.of_type("reply")] == ["this page only watches"]
+        assert len(robot.ways) == 1
+        second.say({"t": "run", "id": 5, "command": "end"})
+        await settle()
+        assert [one["ok"] for one in second.of_type("reply")] == [False, True]
+        assert [name for name, _ in robot.commands] == ["route", "end"]
+        second.say({"t": "stop"})
+        await settle()
+        assert service.controls.controller.lease.state.latched_by == "screen 2"
+        assert [name for name, _ in robot.commands][-1] == "end"
+        first.say({**ROUTE, "id": 6})
+        await settle()
+        assert "Stopped by screen 2" in first.of_type("reply")[-1]["message"]
+        assert len(robot.ways) == 1

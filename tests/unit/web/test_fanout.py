@@ -9,6 +9,7 @@ import pytest
 from tests.unit.web.test_client import frames_in
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import STREAM_KEPT, Hub, LogEntry, SequenceProgress
+from urc.runtime.running_goals import RunningGoal
 from urc.testing.clock import FakeClock, settle
 from urc.web.feed.fanout import Fanout, FanoutPosition, Pacer, Place
 
@@ -211,18 +212,21 @@ def test_pages_are_told_of_all_commands_and_sequences_that_move_the_robot() -> N
     fanout = Fanout(hub, clock=clock, movers=["dance"])
     client = Watcher(fanout)
 
-    def told(watcher: Watcher) -> object:
+    def told(watcher: Watcher) -> Any:
         fanout.flush()
         watcher.take()
         messages = messages_in(b"".join(watcher.frames))
         return [one["moving"] for one in messages if one["t"] == "progress"][-1]
 
-    with hub.moved_by("goto"), hub.moved_by("goto"):
-        assert told(client) == ["goto"]
-        hub.set_progress(SequenceProgress("log", 1, 2, "running"))
-        hub.set_progress(SequenceProgress("dance", 1, 2, "running"))
-        assert told(client) == ["dance", "goto"]
-        assert told(Watcher(fanout)) == ["dance", "goto"]
+    goals = [hub.begin_goal(RunningGoal(0, "goto")) for _ in range(2)]
+    assert told(client) == ["goto"]
+    hub.set_progress(SequenceProgress("log", 1, 2, "running"))
+    hub.set_progress(SequenceProgress("dance", 1, 2, "running"))
+    assert told(client) == ["dance", "goto"]
+    assert told(Watcher(fanout)) == ["dance", "goto"]
+    for goal in goals:
+        assert "goto" in told(client)
+        hub.end_goal(goal)
     hub.set_progress(SequenceProgress("dance", 2, 2, "paused"))
     assert told(client) == ["dance"]
     hub.set_progress(SequenceProgress("dance", 2, 2, "idle"))

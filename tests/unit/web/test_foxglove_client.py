@@ -45,6 +45,7 @@ SIGNALS = {
     "battery": Signal("battery", "integer", unit="%"),
     "mode": Signal("mode", "string"),
     "camera": Signal("camera", "image"),
+    "frames": Signal("frames", "transform_tree"),
     "x": Signal("x", unit="m"),
     "y": Signal("y", unit="m"),
 }
@@ -213,9 +214,11 @@ async def test_a_client_first_learns_of_the_server_then_of_the_channels() -> Non
             "/puppet/battery",
             "/puppet/mode",
             "/puppet/camera",
+            "/puppet/frames",
             "/puppet/x",
             "/puppet/y",
             "/puppet/urc/widget/place",
+            "/puppet/urc/transforms",
             "/puppet/urc/log",
             "/puppet/urc/link/wire",
         ]
@@ -292,6 +295,29 @@ async def test_a_pose_is_sent_once_for_all_its_signals() -> None:
         await seen.reading("y", 3.0)
         places = [one["pose"]["position"] for one in seen.messages(1)]
         assert [(one["x"], one["y"]) for one in places] == [(1.5, -2.0), (1.5, 3.0)]
+
+
+def tree(x: float) -> dict[str, Any]:
+    """Return the value of a transform tree."""
+    row = {"name": "odom", "parent": "map", "depth": 1, "age": 0.0}
+    place = {"translation": (x, 0.0, 0.0), "rotation": (0.0, 0.0, 0.0, 1.0)}
+    return {"frames": ({"name": "map", "parent": "", "depth": 0}, {**row, **place})}
+
+
+async def test_the_transforms_of_a_robot_are_a_topic_that_begins_with_the_newest() -> None:
+    """Frames have the names that the messages of widgets have."""
+    async with viewer() as seen:
+        await seen.subscribe("/puppet/battery", 3)
+        await seen.reading("frames", tree(1.0))
+        await seen.subscribe("/puppet/urc/transforms", 1)
+        await seen.subscribe("/puppet/frames", 2)
+        await seen.reading("frames", tree(2.5))
+        await seen.reading("frames", {"frames": ()})
+        found = [one for message in seen.messages(1) for one in message["transforms"]]
+        assert [one["translation"]["x"] for one in found] == [1.0, 2.5]
+        assert {one["parent_frame_id"] for one in found} == {"puppet/map"}
+        assert len(seen.messages(2)) == 3, "the tree itself is a topic, too"
+        assert seen.messages(3) == []
 
 
 async def test_a_slow_client_gets_the_newest_readings_and_is_told_what_it_missed() -> None:

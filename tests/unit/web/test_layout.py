@@ -242,6 +242,23 @@ def test_next_to_a_stick_only_the_first_row_grows() -> None:
     assert "--urc-down:end" in rules_of(phone, 1)
 
 
+def test_over_a_background_displays_give_way_to_sticks_and_buttons_on_a_low_screen() -> None:
+    """The page scrolls only if all displays are as low as values and the rest is still too high."""
+    slots = (Slot("map", 0, 2), Slot("dock", 1, 0), Slot("move", 1, 2, 2, 1), Slot("low", 2, 0))
+    feet: dict[str, Footprint] = {
+        "map": "view", "dock": "button", "move": "stick", "low": "button"
+    }  # fmt: skip
+    css = over(Layout(3, 3, slots), "map", "dock", "move", "low", **feet)
+    base, phone = css.split("@media")[0], css.split("@media (max-width: 37.499rem)")[1]
+    assert "grid-template-rows:minmax(3.625rem,max-content) " in base
+    room = base.split(">.urc-stage:has(")[0].split("grid-template-rows:auto ")[1]
+    assert room.startswith("minmax(max(calc(3.625rem + ")
+    stick = "calc(var(--urc-stick) + var(--urc-stick-head) - var(--urc-dock) + var(--urc-space-3))"
+    assert f"calc(3.625rem + {stick} + 1*var(--urc-gap))" in room
+    assert "grid-template-rows:auto minmax(min-content,1fr)" in phone
+    assert "max-content" not in phone.split(LEFT_HAND)[0]
+
+
 def test_views_give_way_to_sticks_on_a_phone_in_landscape() -> None:
     slots = (Slot("map", 0, 2), Slot("move", 1, 2, 2, 1))
     css = over(Layout(3, 3, slots), "map", "move", map="view", move="stick")
@@ -294,20 +311,6 @@ def test_only_a_picture_that_is_stacked_asks_for_turning(
     assert needs_turning(page, ("a", "b", "c")) is is_turned
 
 
-def test_the_hint_to_turn_is_for_the_pages_that_need_it() -> None:
-    """Another page of the same interface may be drawn for a phone."""
-    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
-    drawn = Tab(name="two", layouts={"landscape": wide, "phone_portrait": wide})
-    both = Interface("i", tabs={"one": Tab(name="one", layouts={"landscape": wide}), "two": drawn})
-    rules = grid_css(both, ("a", "b", "c"))
-    pages = '.urc-grid[data-page="{0}"],.urc-grid[data-page="{0}-rest"]'
-    hidden = f".urc-stage:has(> :is({pages}))>.urc-turn{{{{display:none}}}}"
-    assert hidden.format(1) in rules
-    assert hidden.format(0) not in rules
-    alone = Interface("i", tabs={"two": drawn})
-    assert "urc-turn" not in grid_css(alone, ("a", "b", "c"))
-
-
 REST = '.urc-grid[data-page="0-rest"]'
 
 
@@ -329,7 +332,10 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
         part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
-    shows = 'display:inline-flex;--urc-rest:"1";--urc-rest-first:"a";--urc-rest-others:""'
+    shows = (
+        "display:inline-flex;--urc-rest:attr(data-rest-one)"
+        ';--urc-rest-first:"a";--urc-rest-others:""'
+    )
     assert f"[data-rest]{{{shows}}}" in text
     assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
 
@@ -341,8 +347,9 @@ def test_the_button_names_the_first_missing_widget_and_counts_the_others() -> No
     screens = Interface("i", layouts={"landscape": wide, "phone_landscape": low})
     titles = {"a": '"}</style>\\', "c": "Brake"}
     text = grid_css(screens, ("a", "b", "c"), titles=titles)
-    assert r'--urc-rest:"2";--urc-rest-first:"\22 }\3c /style\3e \5c ";' in text
-    assert '--urc-rest-others:", 1 " attr(data-rest-more)}' in text
+    assert '--urc-rest:"2 " attr(data-rest-many);' in text
+    assert r'--urc-rest-first:"\22 }\3c /style\3e \5c ";' in text
+    assert '--urc-rest-others:", " attr(data-rest-one)}' in text
 
 
 def test_a_complete_screen_stays_as_it_is_on_the_second_page() -> None:
@@ -388,7 +395,7 @@ def test_over_a_background_a_low_screen_has_a_drawer_for_what_it_lacks() -> None
     assert f'{second} [data-place="1"]{{display:none}}' in short.split("@media")[0]
     shown = f".urc-robot:has(> .urc-stage > {page}) [data-drawer-handle]{{display:inline-flex}}"
     assert f"@media (max-height: 29.999rem) and (min-width: 37.5rem){{{shown}}}" in text
-    assert '--urc-rest:"1"' in text, "the button counts the view only"
+    assert "--urc-rest:attr(data-rest-one)" in text, "the button counts the view only"
 
 
 def test_only_a_background_leaves_room_for_a_drawer() -> None:

@@ -2,6 +2,8 @@
 
 import base64
 import re
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -13,8 +15,9 @@ from urc.runtime.audit_search import AuditQuery, search
 
 
 @pytest.fixture
-def door(tmp_path: Path) -> Door:
-    return Door(tmp_path)
+def door(tmp_path: Path) -> Iterator[Door]:
+    with closing(Door(tmp_path)) as opened:
+        yield opened
 
 
 def test_a_device_pairs_and_both_screens_show_the_same_number(door: Door) -> None:

@@ -1,7 +1,9 @@
 """People, devices, tokens and sign-ins over HTTP, for administrators and for oneself."""
 
 from collections import Counter
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -14,8 +16,9 @@ from urc.web.serve.rights import FRESH_S
 
 
 @pytest.fixture
-def door(tmp_path: Path) -> Door:
-    return Door(tmp_path)
+def door(tmp_path: Path) -> Iterator[Door]:
+    with closing(Door(tmp_path)) as opened:
+        yield opened
 
 
 def test_only_administrators_manage_people(door: Door) -> None:

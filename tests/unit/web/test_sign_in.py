@@ -1,5 +1,7 @@
 """Sign-in by name and passphrase over HTTP, its limits, and the sign-out."""
 
+from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -12,8 +14,9 @@ from urc.web.people.sign_in_page import own_path
 
 
 @pytest.fixture
-def door(tmp_path: Path) -> Door:
-    return Door(tmp_path)
+def door(tmp_path: Path) -> Iterator[Door]:
+    with closing(Door(tmp_path)) as opened:
+        yield opened
 
 
 def sign_in(browser: TestClient, name: str, passphrase: str = PASSPHRASE) -> int:

@@ -14,6 +14,7 @@ from urc.model.payload import Envelope, Payload, WriteSpec
 from urc.protocol.forms.json_text import JsonWriter, filled
 from urc.protocol.forms.table import build_writer
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadWriter
+from urc.ros_names import relative_name, resolved_name
 
 __all__ = ["EnvelopeWriter", "place_writer"]
 
@@ -100,6 +101,8 @@ _WRITTEN: Final[Mapping[str, Callable[[str, bool], str]]] = {
 
 _ADDRESS: Final = ("topic", "service", "action", "method", "path", "url", "query", "parameters")
 """Attributes that form an envelope's address; all other attributes are delivery options."""
+_NAMES: Final = ("topic", "service", "action")
+"""Attributes that a namespace of ROS applies to."""
 _TEXTS: Final = ("query", "headers", "parameters")
 """Attributes whose values map names to text."""
 
@@ -125,6 +128,9 @@ class EnvelopeWriter:
         attributes = filled(self._rest, namespace)
         for name, place in self._places.items():
             attributes[name] = place.write(namespace)
+        for name in _NAMES:
+            if isinstance(attributes.get(name), str):
+                attributes[name] = resolved_name(attributes[name], self._context.namespace)
         for name in _TEXTS:
             if name in attributes:
                 values = attributes[name].items()
@@ -144,7 +150,14 @@ class EnvelopeWriter:
             value = envelope.attributes.get("path" if name == "url" else name)
             if name == "path" and name in self._places and isinstance(value, str):
                 value = unquote(value)
-            if name in self._attributes and not self._is_here(self._attributes[name], value, found):
+            if name not in self._attributes:
+                continue
+            tree = self._attributes[name]
+            if name in _NAMES and isinstance(value, str):
+                short = relative_name(value, self._context.namespace)
+                if short != value and self._is_here(tree, short, found):
+                    continue
+            if not self._is_here(tree, value, found):
                 return None
         if self._body is None:
             return found

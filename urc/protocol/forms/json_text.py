@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping
 from typing import Any, Final
 
-from urc.expressions import Template, quoted
+from urc.expressions import ExpressionError, Template, quoted
 from urc.model.payload import Envelope, Payload, WriteSpec
 from urc.protocol.values.payload import BadText, CodecContext, Frame, NotWritable
 from urc.protocol.values.text_values import counter_in
@@ -20,6 +20,9 @@ class JsonWriter:
 
     def __init__(self, spec: WriteSpec, context: CodecContext) -> None:
         self._tree: Any = spec.options["tree"]
+        is_stamped = spec.options.get("is_stamped")
+        if isinstance(is_stamped, Template) and _holds(is_stamped, context.settings):
+            self._tree = spec.options["stamped"]
         self._encoding = context.encoding
         # Other characters become \uXXXX in ASCII, which every connection can carry.
         is_ascii = context.encoding != "utf-8"
@@ -62,6 +65,14 @@ class JsonWriter:
             return None
         found: dict[str, object] = {}
         return found if matches(self._tree, value, found) else None
+
+
+def _holds(chosen: Template, settings: Mapping[str, object]) -> bool:
+    """Return whether an expression over settings is true; false in manuals, without settings."""
+    try:
+        return bool(chosen.evaluate({"settings": settings}))
+    except ExpressionError:
+        return False
 
 
 def filled(tree: Any, namespace: Mapping[str, object]) -> Any:

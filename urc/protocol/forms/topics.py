@@ -11,21 +11,27 @@ from typing import NamedTuple, cast
 
 from urc.expressions import ExpressionError, Template
 from urc.key_expressions import key_matches
-from urc.model.driver import Driver, Reply
+from urc.model.driver import Driver, Reply, TransportSpec
 from urc.model.payload import Envelope, Payload, ReadSpec, each_of
-from urc.model.sequence import ExpectStep, all_steps
+from urc.model.sequence import ExpectStep, SendStep, all_steps
 from urc.model.values import WHOLE_TYPES, Value
 from urc.problems import UrcError
+from urc.protocol.forms.json_text import filled
 from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
+from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
+from urc.ros_names import resolved_name
 
 __all__ = [
     "PublishedTopic",
     "ReadTopic",
     "TopicReader",
+    "actions_of",
+    "context_of",
     "frame_of",
     "listened",
     "matches",
+    "namespace_of",
     "packed_topics",
     "paths_by_topic",
     "published",
@@ -45,7 +51,7 @@ class TopicReader:
 
     def __init__(self, reader: PayloadReader, spec: ReadSpec, context: CodecContext) -> None:
         self._reader = reader
-        self._topic = topic_of(spec, context.settings)
+        self._topic = topic_of(spec, context.settings, context.namespace)
         self._fits = key_matches(self._topic) if context.has_keys else matches(self._topic)
         self._wild = _KEY_WILD if context.has_keys else _WILD
         self._is_plain = not self._wild.search(self._topic)
@@ -92,12 +98,45 @@ def matches(topic: str) -> Callable[[str], bool]:
     return fits
 
 
-def topic_of(spec: ReadSpec, settings: Mapping[str, object]) -> str:
-    """Return the topic in a declaration; raise `UrcError` if the template fails."""
+def topic_of(spec: ReadSpec, settings: Mapping[str, object], namespace: str | None = None) -> str:
+    """Return the topic in a declaration; raise `UrcError` if the template fails.
+
+    Args:
+        spec: the declaration.
+        settings: values of the settings.
+        namespace: namespace for relative names; see `namespace_of`.
+    """
     try:
-        return "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
+        topic = "" if spec.topic is None else str(spec.topic.evaluate({"settings": settings}))
     except ExpressionError as error:
         raise UrcError(f"a topic: {error}") from None
+    return resolved_name(topic, namespace)
+
+
+def namespace_of(spec: TransportSpec, settings: Mapping[str, object]) -> str | None:
+    """Return the namespace of a ROS connection; None if the document declares none.
+
+    Raises:
+        UrcError: the template fails.
+    """
+    if spec.type != "ros" or "namespace" not in spec.options:
+        return None
+    try:
+        return str(filled(spec.options["namespace"], {"settings": settings}))
+    except ExpressionError as error:
+        raise UrcError(f"{spec.name}: namespace: {error}") from None
+
+
+def context_of(
+    spec: TransportSpec,
+    settings: Mapping[str, object],
+    fresh: TimeAndNonce = FIXED,
+    *,
+    is_compiled: bool = False,
+) -> CodecContext:
+    """Return the context for the readers and writers of a transport."""
+    namespace = namespace_of(spec, settings)
+    return CodecContext(spec.encoding, settings, fresh, is_compiled, spec.has_keys, namespace)
 
 
 def frame_of(payload: Payload, encoding: str) -> Frame:
@@ -126,8 +165,9 @@ def listened(
     """
     topics: dict[str, dict[str, Value]] = {}
     trees: set[str] = set()
+    namespace = namespace_of(driver.transports[transport], settings)
     for read in _reads(driver, transport):
-        if read.topic is not None and (topic := topic_of(read, settings)):
+        if read.topic is not None and (topic := topic_of(read, settings, namespace)):
             mine = topics.setdefault(topic, {})
             for name, value in read.listen.items():
                 mine.setdefault(name, value)
@@ -156,8 +196,9 @@ def read_topics(
     listening = [one for one in driver.messages.values() if one.transport == transport]
     simple = [one.read for one in listening if one.acknowledge is None]
     found: dict[str, ReadTopic] = {}
+    namespace = namespace_of(driver.transports[transport], settings)
     for read in _reads(driver, transport):
-        if read.topic is not None and (topic := topic_of(read, settings)):
+        if read.topic is not None and (topic := topic_of(read, settings, namespace)):
             fields, is_only = found.get(topic, ReadTopic(frozenset(), is_only_listened=True))
             is_simple = any(read is one for one in simple)
             found[topic] = ReadTopic(fields | set(read.fields), is_only and is_simple)
@@ -180,6 +221,7 @@ def published(
 
     A topic that depends on the arguments of a command is left out.
     """
+    namespace = namespace_of(driver.transports[transport], settings)
     for command in driver.commands.values():
         for spec in each_of(command.send) if command.transport == transport else ():
             if spec.form != "envelope" or spec.options.get("verb") != "publish":
@@ -187,7 +229,26 @@ def published(
             attributes = cast("Mapping[str, object]", spec.options["attributes"])
             found = [_fixed(attributes.get(name), settings) for name in ("topic", "type")]
             if found[0] and found[1] is not None:
-                yield PublishedTopic(command.name, found[0], found[1])
+                yield PublishedTopic(command.name, resolved_name(found[0], namespace), found[1])
+
+
+def actions_of(driver: Driver, transport: str, settings: Mapping[str, object]) -> tuple[str, ...]:
+    """Return the ROS actions to which a driver's commands send goals or cancellations.
+
+    An action whose name depends on the arguments of a command is left out.
+    """
+    found: dict[str, None] = {}
+    namespace = namespace_of(driver.transports[transport], settings)
+    for command in driver.commands.values():
+        sends = [(command.transport, one) for one in each_of(command.send)]
+        steps = (step for step in all_steps(command.steps) if isinstance(step, SendStep))
+        sends += [(step.transport, one) for step in steps for one in each_of(step.send)]
+        for line, spec in sends:
+            if line == transport and spec.options.get("verb") in ("goal", "cancel"):
+                attributes = cast("Mapping[str, object]", spec.options["attributes"])
+                if action := _fixed(attributes.get("action"), settings):
+                    found[resolved_name(action, namespace)] = None
+    return tuple(found)
 
 
 def _fixed(value: object, settings: Mapping[str, object]) -> str | None:
@@ -211,10 +272,11 @@ def paths_by_topic(
         for kind in WHOLE_TYPES
     }
     found: dict[str, list[Path]] = {}
+    namespace = namespace_of(driver.transports[transport], settings)
     for read in _reads(driver, transport):
         if read.topic is not None:
             paths = paths_of(read, kinds["occupancy_grid"], kinds["transform_tree"])
-            found.setdefault(topic_of(read, settings), []).extend(paths)
+            found.setdefault(topic_of(read, settings, namespace), []).extend(paths)
     return found
 
 

@@ -153,6 +153,11 @@ class Readings:
             elif self.tree is not None and name == self.tree.name:
                 self.tree.forget()
 
+    def forget_stamps(self) -> None:
+        """Accept transforms with older timestamps, after a restart of the robot's simulation."""
+        if self.tree is not None:
+            self.tree.tree.forget_stamps()
+
     def defer_grids(self) -> None:
         """Return occupancy grids as `UnencodedGrid` from now on, except those that formulas use."""
         self._defers_grids = True

@@ -3,7 +3,7 @@
 Pure. See `urc.protocol.requests.conversation` for the theory of operation.
 """
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from urc.model.driver import TransportSpec
 from urc.model.payload import Envelope, Payload, traffic_of
@@ -27,7 +27,15 @@ from urc.protocol.requests.request_queue import RequestQueue, rendered_size
 if TYPE_CHECKING:
     from urc.protocol.ros.topic_codec import TopicCodec
 
-__all__ = ["Connection"]
+__all__ = ["GOAL", "MOST_IN_FLIGHT", "Connection"]
+
+GOAL: Final = "goal"
+"""Verb of an envelope that sends a goal of a ROS action."""
+MOST_IN_FLIGHT: Final = 256
+"""Maximum number of pending replies, including late and real-time replies."""
+MAX_WAITING: Final = 64
+"""Maximum number of goals that wait for their services; above it, the oldest is refused."""
+_OVER: Final = "its command has ended, so the goal is not sent"
 
 
 class Connection:
@@ -62,6 +70,8 @@ class Connection:
         """Whether received frames remain in the buffer until `process_frames` is called again."""
         self._askers: dict[object, object] = {}
         """Sequences whose numbered requests are pending, keyed by request number."""
+        self._waiting_goals: dict[object, Exchange] = {}
+        """Sent goals that may still wait for their services, keyed by request number."""
         self._is_leaving = False
         self._misses = 0
         """Number of consecutive missing replies."""
@@ -169,6 +179,7 @@ class Connection:
         self.is_behind = False
         self.learnt = {}
         self._askers.clear()
+        self._waiting_goals.clear()
         if state == "open":
             self.counters.reset()
             if self.codec is not None:
@@ -204,14 +215,26 @@ class Connection:
             return [Send(self.spec.name, found.reply)]
         return [] if found.envelope is None else self._envelope(found.envelope, now)
 
-    def _refused(self, goal: Envelope, now: float) -> Envelope | None:
-        """Return a refusal of a goal whose command's conditions no longer hold, or None.
+    def _note_sent(self, data: Payload, exchange: Exchange, number: int | None) -> None:
+        """Keep what later frames refer to: goals that wait for services, and numbered requests."""
+        if self.codec is not None and isinstance(data, Envelope) and data.verb == GOAL:
+            _keep(self._waiting_goals, number, exchange, MAX_WAITING)
+        if number is not None and not exchange.ask.answers:
+            _keep(self._askers, number, exchange.owner, MOST_IN_FLIGHT)
 
-        A goal waits up to a second for its services, which is long enough for a change.
+    def _refused(self, goal: Envelope, now: float) -> Envelope | None:
+        """Return a refusal of a goal that must not be sent any more, or None.
+
+        A goal waits up to a second for its services. Meanwhile, the conditions of its command, the
+        rights of its operator and the lease may change, and the command may have failed.
         """
         number = goal.attributes.get("id")
-        pending = self._pending_replies.numbered(number)
-        why_not = "" if pending is None else pending.exchange.why_not(now)
+        exchange = self._waiting_goals.pop(number, None)
+        is_awaited = self._pending_replies.numbered(number) is not None
+        if exchange is None or (exchange.ask.answers and not is_awaited):
+            why_not = _OVER
+        else:
+            why_not = exchange.why_not(now)
         attributes = {"id": number, "ok": False, "reason": why_not}
         return Envelope("response", attributes) if why_not else None
 
@@ -222,6 +245,13 @@ class Connection:
     def _pump(self, now: float) -> list[LineEvent]:
         """Send queued requests if the connection's current state allows it."""
         raise NotImplementedError
+
+
+def _keep(found: dict[object, Any], number: object, item: object, most: int) -> None:
+    """Add an item with a request's number; above `most` items, the oldest is dropped."""
+    while len(found) >= most:
+        del found[next(iter(found))]
+    found[number] = item
 
 
 def _disconnected(lost: list[Exchange], reason: str) -> list[LineEvent]:

@@ -27,7 +27,7 @@ from urc.protocol.forms.topics import frame_of
 from urc.protocol.framing.base import FrameFault
 from urc.protocol.framing.delimited import DelimiterDecoder
 from urc.protocol.readings.compiled_value import Taken
-from urc.protocol.requests.connection import Connection
+from urc.protocol.requests.connection import MOST_IN_FLIGHT, Connection
 from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import (
     DONE,
@@ -51,8 +51,6 @@ new = tuple.__new__
 """Fast constructor of named tuples, used for every command."""
 MISSES_UNTIL_CLOSED = 3
 """Number of consecutive missing replies after which the connection is closed."""
-MOST_IN_FLIGHT = 256
-"""Maximum number of pending replies, including late and real-time replies."""
 
 
 class Conversation(Connection):
@@ -210,11 +208,8 @@ class Conversation(Connection):
             again = partial(self._count_again, exchange, number)
             shared = CountedFrame(Numbered(data, count), again)
         sent.append(new(Send, (self.spec.name, data, exchange.is_secret, shared)))
+        self._note_sent(data, exchange, number)
         if not ask.answers:
-            if number is not None:
-                if len(self._askers) >= MOST_IN_FLIGHT:
-                    self._askers.pop(next(iter(self._askers)))
-                self._askers[number] = exchange.owner
             sent.append(ExchangeEnded(exchange, DONE))
             return sent
         if ask.framing is not None:

@@ -13,7 +13,7 @@ from urc.model.values import NOTHING
 from urc.protocol.forms.http_head import LOCATION
 from urc.protocol.forms.json_text import filled
 from urc.protocol.forms.table import build_reader
-from urc.protocol.forms.topics import paths_by_topic, topic_of
+from urc.protocol.forms.topics import context_of, paths_by_topic, topic_of
 from urc.protocol.framing.table import build_framing
 from urc.protocol.readings.compiled import build_fast_read
 from urc.protocol.readings.readings import Readings
@@ -65,9 +65,7 @@ class RequestCompiler:
         self.lines: dict[str, Conversation] = {}
         for name, spec in driver.transports.items():
             messages = [one for one in driver.messages.values() if one.transport == name]
-            context = CodecContext(
-                spec.encoding, self._readings.settings, fresh, is_compiled, spec.has_keys
-            )
+            context = context_of(spec, self._readings.settings, fresh, is_compiled=is_compiled)
             matchers = [self._message(one.read, context) for one in messages]
             if any(one.acknowledge or one.log or one.read.collects for one in messages):
                 self._react(spec, messages, matchers, context)
@@ -168,12 +166,8 @@ class RequestCompiler:
         arguments: Mapping[str, Argument] = NOTHING,
     ) -> CompiledRequest:
         line = self.lines[transport]
-        context = CodecContext(
-            line.spec.encoding,
-            self._readings.settings,
-            self._fresh,
-            self._is_compiled,
-            line.spec.has_keys,
+        context = context_of(
+            line.spec, self._readings.settings, self._fresh, is_compiled=self._is_compiled
         )
         encode = build_encode(send, line.framing, context, arguments)
         if line.codec is not None:
@@ -220,7 +214,7 @@ class RequestCompiler:
 
     def _answer(self, transport: str, stage: Stage) -> CompiledReply:
         spec = self.lines[transport].spec
-        context = CodecContext(spec.encoding, self._readings.settings, has_keys=spec.has_keys)
+        context = context_of(spec, self._readings.settings)
         asides: tuple[tuple[Aside, ReadSpec | None], ...]
         asides = (("resend", stage.asides.resend), ("extend", stage.asides.extend))
         return CompiledReply(
@@ -247,7 +241,7 @@ class RequestCompiler:
         return Matcher(matcher.reader, matcher.decode, compiled)
 
     def _matcher(self, read: ReadSpec, context: CodecContext) -> Matcher:
-        topic = "" if read.topic is None else topic_of(read, context.settings)
+        topic = "" if read.topic is None else topic_of(read, context.settings, context.namespace)
         throttle = read.listen.get("throttle")
         throttle_s = throttle if isinstance(throttle, float) else None
         decode = self._readings.decoder(read.fields, topic, throttle_s)

@@ -4,7 +4,7 @@ A robot sends definitions of the types that it publishes, but not of the types t
 receives. Messages of other types are sent as JSON (`urc.protocol.ros.topic_codec`).
 
 Sources: common_interfaces, rcl_interfaces, unique_identifier_msgs and common_msgs, from ROS 2 Jazzy
-and ROS 1 Noetic.
+and ROS 1 Noetic; control_msgs 6.8.0.
 """
 
 from collections.abc import Mapping
@@ -87,6 +87,8 @@ trajectory_msgs/JointTrajectory: Header header, string[] joint_names,
   JointTrajectoryPoint[] points
 trajectory_msgs/JointTrajectoryPoint: float64[] positions, float64[] velocities,
   float64[] accelerations, float64[] effort, builtin_interfaces/Duration time_from_start
+control_msgs/JointJog: Header header, string[] joint_names, float64[] displacements,
+  float64[] velocities, float64 duration
 action_msgs/GoalInfo: unique_identifier_msgs/UUID goal_id, builtin_interfaces/Time stamp
 unique_identifier_msgs/UUID: uint8[16] uuid
 actionlib_msgs/GoalID: builtin_interfaces/Time stamp, string id

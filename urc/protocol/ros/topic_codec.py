@@ -20,6 +20,10 @@ its id, in a field of its own. A bridge may also list the fields of the goal aft
 the bytes are the same. Results and feedback are defined in both ways, too. The codec returns their
 inner part, as rosbridge does.
 
+Servers of the Foxglove SDK send Protocol Buffers or FlatBuffers instead of ROS messages. Their
+schemas are definitions like all others. A type of Protocol Buffers, such as ``foxglove.Log``, is
+written by the schema that the robot has sent.
+
 Services have their own definitions, which the transport delivers with the first call. The transport
 returns the call with the verb `UNENCODED`; the codec then sends the call again in binary form.
 """
@@ -31,6 +35,11 @@ from typing import Any, Final, NamedTuple, cast
 from urc.model.driver import STOPPED
 from urc.model.payload import Envelope, Payload
 from urc.problems import UrcError, printable
+from urc.protocol.flatbuffer.read import FlatbufferReader
+from urc.protocol.flatbuffer.schema import parse_schema as parse_binary_schema
+from urc.protocol.protobuf.read import ProtobufReader
+from urc.protocol.protobuf.schema import ProtoTypes, parse_schema
+from urc.protocol.protobuf.write import ProtobufWriter
 from urc.protocol.ros.common_types import common_types
 from urc.protocol.ros.definition import BadDefinition, Definitions, Record, layout_of, plain_name
 from urc.protocol.ros.idl_text import parse_idl
@@ -54,6 +63,11 @@ notation and text."""
 MAX_COMPILED: Final = 256
 """Maximum number of compiled types on one connection. Without this limit, a hostile robot could
 announce an unlimited number of new types."""
+MAX_SCHEMAS: Final = 64
+"""Maximum number of schemas of Protocol Buffers on one connection."""
+MAX_PREPARED: Final = 100_000
+"""Maximum number of fields in all readers for Protocol Buffers and FlatBuffers; each takes about a
+kilobyte."""
 _SHOWN: Final = 60
 _ORDERS: Final = {0: (">", 8), 1: ("<", 8), 6: (">", 4), 7: ("<", 4)}
 """Byte order and largest alignment for CDR and plain CDR2, keyed by encapsulation identifier."""
@@ -126,14 +140,24 @@ class TopicCodec:
         self._wanted = {topic: wanted_of(set(each)) for topic, each in (paths or {}).items()}
         self._is_ros1 = is_ros1
         self._has_hashes = has_hashes
-        self._sources: dict[str, _Source] = {}
-        self._services: dict[str, tuple[Writer | None, _Source | None, str]] = {}
-        self._compiled: dict[tuple[object, ...], _Source | Writer] = {}
+        self._sources: dict[str, _AnySource] = {}
+        self._services: dict[str, tuple[_AnyWriter | None, _AnySource | None, str]] = {}
+        self._compiled: dict[tuple[object, ...], _AnySource | _AnyWriter] = {}
         self._known: dict[str, Definitions] = {}
         """Definitions from the robot, keyed by the type's short name."""
         self._writers: dict[tuple[str, bool], Writer | None] = {}
+        self._schemas: dict[str, ProtoTypes] = {}
+        """Parsed schemas of Protocol Buffers, keyed by their text."""
+        self._schema_writers: dict[str, tuple[ProtobufWriter, str]] = {}
+        """Writer and schema of each published type of Protocol Buffers. They outlive a connection,
+        because a stop is sent first on the next one. The transport sends the schema, too.
+        """
         self._nested: set[str] = set()
         """Topics and services whose messages contain the feedback or the result in a field."""
+        self._prepared = 0
+        """Number of fields in the readers for Protocol Buffers and FlatBuffers."""
+        self._refused: dict[str, str] = {}
+        """Reason why the definition of a topic is unreadable, keyed by topic."""
         self._stops = 0
         """Number of presses of STOP."""
 
@@ -144,10 +168,13 @@ class TopicCodec:
     def reset(self) -> None:
         """Discard the definitions of the previous connection."""
         self._sources.clear()
+        self._refused.clear()
+        self._prepared = 0
         self._services.clear()
         self._compiled.clear()
         self._known.clear()
         self._writers.clear()
+        self._schemas.clear()
         self._nested.clear()
 
     # -- received envelopes
@@ -161,8 +188,7 @@ class TopicCodec:
         """Return the envelope with plain data in place of bytes."""
         try:
             if envelope.verb == DEFINITION:
-                self._define(envelope)
-                return Received()
+                return self._definition(envelope)
             if envelope.verb == UNENCODED:
                 return self._encode_call(envelope)
             return Received(self._plain(envelope))
@@ -170,9 +196,19 @@ class TopicCodec:
             name = envelope.attributes.get("topic") or envelope.attributes.get("service")
             return Received(fault=f"{printable(str(name))[:_SHOWN]}: {fault}")
 
-    def _define(self, envelope: Envelope) -> None:
+    def _definition(self, envelope: Envelope) -> Received:
+        """Store a definition, or the reason why it is unreadable."""
+        topic = str(envelope.attributes.get("topic"))
+        self._refused.pop(topic, None)
+        try:
+            self._define(envelope, topic)
+        except BadDefinition as fault:
+            self._refused[topic] = str(fault)
+            raise
+        return Received()
+
+    def _define(self, envelope: Envelope, topic: str) -> None:
         said = envelope.attributes
-        topic = str(said.get("topic"))
         self._sources.pop(topic, None)
         self._nested.discard(topic)
         schema = _Schema(
@@ -185,9 +221,11 @@ class TopicCodec:
             check_known(schema.type, str(said.get("hash")))
         if schema.encoding == "json":
             return  # the form ``json`` reads bytes
-        self._is_ros1 = schema.encoding == "ros1"
+        is_ros = schema.encoding in ("cdr", "ros1")
+        if is_ros:
+            self._is_ros1 = schema.encoding == "ros1"
         wanted = self._wanted.get(topic, ALL)
-        if schema.type.endswith(_FEEDBACK) and self._is_nested(schema, "feedback"):
+        if is_ros and schema.type.endswith(_FEEDBACK) and self._is_nested(schema, "feedback"):
             wanted = {"feedback": wanted}
             self._nested.add(topic)
         self._sources[topic] = self._source(schema, wanted)
@@ -201,15 +239,50 @@ class TopicCodec:
             one.name == name and one.type.endswith(f"_{name.capitalize()}") for one in fields
         )
 
-    def _source(self, schema: _Schema, wanted: Wanted) -> _Source:
+    def _source(self, schema: _Schema, wanted: Wanted) -> "_AnySource":
         key = (schema, repr(wanted))
         found = self._compiled.get(key)
-        if not isinstance(found, _Source):
-            found = _Source(self._layout(schema), wanted, is_ros1=schema.encoding == "ros1")
+        if not isinstance(found, _AnySource):
+            if schema.encoding == "protobuf":
+                found = ProtobufReader(self._types(schema), schema.type, wanted)
+            elif schema.encoding == schema.notation == "flatbuffer":
+                found = FlatbufferReader(parse_binary_schema(schema.text), schema.type, wanted)
+            else:
+                found = _Source(self._layout(schema), wanted, is_ros1=schema.encoding == "ros1")
+            if not isinstance(found, _Source):
+                self._prepared += found.size
+                if self._prepared > MAX_PREPARED:
+                    raise BadDefinition(f"the robot's types have more than {MAX_PREPARED} fields")
             self._keep(key, found)
         return found
 
-    def _keep(self, key: tuple[object, ...], made: "_Source | Writer") -> None:
+    def _types(self, schema: _Schema) -> ProtoTypes:
+        """Return the types in a schema of Protocol Buffers."""
+        if schema.notation != "protobuf":
+            raise BadDefinition(f"the definition notation {schema.notation!r} is not supported")
+        found = self._schemas.get(schema.text)
+        if found is None:
+            found = parse_schema(schema.text)
+            if len(self._schemas) >= MAX_SCHEMAS:
+                raise BadDefinition(f"the robot has announced more than {MAX_SCHEMAS} definitions")
+            self._schemas[schema.text] = found
+            for kind in self._schema_writers.keys() & found.messages.keys():
+                del self._schema_writers[kind]
+        return found
+
+    def _request_writer(self, schema: _Schema) -> "_AnyWriter":
+        """Return the writer for the requests of a service."""
+        key = (schema, "writer")
+        found = self._compiled.get(key)
+        if not isinstance(found, _AnyWriter):
+            if schema.encoding == "protobuf":
+                found = ProtobufWriter(self._types(schema), schema.type)
+            else:
+                found = Writer(self._layout(schema), is_ros1=schema.encoding == "ros1")
+            self._keep(key, found)
+        return found
+
+    def _keep(self, key: tuple[object, ...], made: "_AnySource | _AnyWriter") -> None:
         if len(self._compiled) >= MAX_COMPILED:
             raise BadDefinition(f"the robot has announced more than {MAX_COMPILED} types")
         self._compiled[key] = made
@@ -250,7 +323,10 @@ class TopicCodec:
     def _read(self, envelope: Envelope, body: bytes) -> dict[str, Any]:
         said = envelope.attributes
         if envelope.verb == "message":
-            source = self._sources.get(str(said.get("topic")))
+            topic = str(said.get("topic"))
+            source = self._sources.get(topic)
+            if topic in self._refused:
+                raise BadRosMessage(self._refused[topic])
         else:
             source = self._services.get(str(said.get("service")), (None, None, ""))[1]
         if source is None:
@@ -274,12 +350,7 @@ class TopicCodec:
                 self._services[service] = (None, None, "json")
                 self._nested.add(service)
             else:
-                key = (request, "writer")
-                writer = self._compiled.get(key)
-                if not isinstance(writer, Writer):
-                    is_ros1 = request.encoding == "ros1"
-                    writer = Writer(self._layout(request), is_ros1=is_ros1)
-                    self._keep(key, writer)
+                writer = self._request_writer(request)
                 source = None if response.encoding == "json" else self._source(response, ALL)
                 self._services[service] = (writer, source, request.encoding)
                 if "goal" in said and not self._is_nested(request, "goal"):
@@ -323,7 +394,10 @@ class TopicCodec:
             return payload._replace(attributes={**payload.attributes, "stops": [self._stops]})
         if payload.verb != "publish":
             return payload
-        writer = self._writer(plain_name(str(payload.attributes.get("type") or "")))
+        kind = str(payload.attributes.get("type") or "")
+        if "." in kind and (found := self._schema_writer(kind)) is not None:
+            return _with_schema(payload, *found)
+        writer = self._writer(plain_name(kind))
         if writer is None:
             return payload
         written = writer.write(payload.body)
@@ -335,6 +409,16 @@ class TopicCodec:
         if self._has_hashes:
             added["hash"] = known_hash(str(payload.attributes.get("type")))
         return payload._replace(attributes={**payload.attributes, **added})
+
+    def _schema_writer(self, kind: str) -> tuple[ProtobufWriter, str] | None:
+        """Return the writer for a type of Protocol Buffers and its schema, if one contains it."""
+        found = self._schema_writers.get(kind)
+        if found is None:
+            for text, types in self._schemas.items():
+                if kind in types.messages:
+                    found = self._schema_writers[kind] = ProtobufWriter(types, kind), text
+                    break
+        return found
 
     def _writer(self, name: str) -> Writer | None:
         key = (name, self._is_ros1)
@@ -350,6 +434,8 @@ class TopicCodec:
         return self._writers[key]
 
 
+_AnySource = _Source | ProtobufReader | FlatbufferReader
+_AnyWriter = Writer | ProtobufWriter
 _OUTCOMES: Final = {4: "", 5: "the action was cancelled", 6: "the action was aborted"}
 """Outcome of each status of a goal that has ended (action_msgs/msg/GoalStatus)."""
 _NO_STATUS: Final = "the bridge sent a result without a status"
@@ -371,6 +457,18 @@ def _result(said: Envelope, *, is_nested: bool) -> Envelope:
         attributes["reason"] = reason
     flat = {name: value for name, value in body.items() if name != "status"}
     return Envelope("response", attributes, body.get("result") if is_nested else flat)
+
+
+def _with_schema(payload: Envelope, writer: ProtobufWriter, schema: str) -> Envelope:
+    """Return a message with its bytes, and with the schema that its reader needs."""
+    written = writer.write(payload.body)
+    added = {
+        "encoding": "protobuf",
+        "data": written.data,
+        "stamps": list(written.stamps),
+        "schema": schema,
+    }
+    return payload._replace(attributes={**payload.attributes, **added})
 
 
 def _flat(body: object) -> object:

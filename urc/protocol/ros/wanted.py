@@ -30,7 +30,13 @@ _GRID_PARTS: Final[tuple[Path, ...]] = (
     ("data", PACKED),
 )
 """Paths in an occupancy grid or in its update; a message has only some of them."""
-_TREE_PART: Final[Path] = ("transforms", FEW)
+_TREE_PARTS: Final[tuple[Path, ...]] = (
+    ("transforms", FEW),
+    *((name,) for name in ("parent_frame_id", "child_frame_id", "timestamp")),
+    ("translation",),
+    ("rotation",),
+)
+"""Paths in a list of transforms, and in a single foxglove.FrameTransform."""
 _AROUND: Final = frozenset(
     (
         "multi_select_list",
@@ -85,7 +91,7 @@ def paths_of(
         if isinstance(path, tuple) and field in grids:
             yield from (path + part for part in _GRID_PARTS)
         elif isinstance(path, tuple) and field in trees:
-            yield path + _TREE_PART
+            yield from (path + part for part in _TREE_PARTS)
         elif isinstance(path, tuple):
             yield tuple(step if isinstance(step, str) else EACH for step in path)
         else:

@@ -11,6 +11,7 @@ from urc.model import sequence
 from urc.model.driver import Driver
 from urc.model.values import Value
 from urc.protocol.events import Samples
+from urc.protocol.requests.connection import GOAL
 from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import CompiledRequest, Exchange, LineEvent, expires_at, untold
 from urc.protocol.requests.reply_match import CompiledReply, Expectation, Matcher
@@ -155,6 +156,7 @@ def _failed(runner: SequenceRunner, now: float, text: Template) -> list[LineEven
 
 def _sending(ask: CompiledRequest, step: sequence.SendStep) -> Action:
     names = step.send.names - {COUNTERS}
+    is_goal = step.send.options.get("verb") == GOAL
 
     def send(runner: SequenceRunner, now: float) -> list[LineEvent]:
         line = runner.host.lines[step.transport]
@@ -175,7 +177,7 @@ def _sending(ask: CompiledRequest, step: sequence.SendStep) -> Action:
         ).mark(
             is_privileged=runner.privileged_on == step.transport,
             is_secret=step.is_secret,
-            unless=runner.why_over,
+            unless=runner.why_no_goal if is_goal else runner.why_over,
         )
         runner.wait()
         return line.submit(exchange, now)
@@ -232,6 +234,7 @@ def _running(step: sequence.RunStep) -> Action:
             runner.stop("bad-argument", str(error))
             return []
         runner.wait()
+        is_goal = runner.host.may_send_goal(step.command)
         return runner.host.run(
             step.command,
             arguments,
@@ -239,7 +242,7 @@ def _running(step: sequence.RunStep) -> Action:
             now,
             privileged_on=runner.privileged_on,
             confirmed_by=runner.confirmed_by,
-            unless=runner.why_over,
+            unless=runner.why_no_goal if is_goal else runner.why_over,
         )
 
     return run

@@ -46,6 +46,9 @@ class SequenceHost(Protocol):
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink`."""
 
+    def may_send_goal(self, command: str) -> bool:
+        """Return whether a command sends a goal of a ROS action, or is a sequence, which may."""
+
 
 Action = Callable[["SequenceRunner", float], list[LineEvent]]
 """A compiled step."""
@@ -105,6 +108,8 @@ class SequenceRunner:
         self._late_text = ""
         self._logins: list[Conversation] = []
         """Connections that must complete their logins before the first step."""
+        self.unless: Unless | None = None
+        """Function that returns why the sequence may start no goal now, or ""."""
         program.sequence_control.start()
 
     @property
@@ -211,6 +216,10 @@ class SequenceRunner:
     def why_over(self) -> str:
         """Return why the run must not send further frames; "" if it may continue."""
         return self._outcome.message if self._outcome is not None else ""
+
+    def why_no_goal(self) -> str:
+        """Return why the run must not send a goal now; "" if it may."""
+        return self.why_over() or (self.unless() if self.unless is not None else "")
 
     # -- called by the engine
 

@@ -90,6 +90,8 @@ class CodecContext(NamedTuple):
     in live sessions."""
     has_keys: bool = False
     """Whether topics are Zenoh keys, with the wildcards of key expressions."""
+    namespace: str | None = None
+    """Namespace of ROS for relative names; None to keep all names as written."""
 
 
 class PayloadReader(Protocol):

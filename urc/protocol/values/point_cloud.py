@@ -13,6 +13,8 @@ part. Every nth point would not do. A laser scanner with 16 rings sends the ring
 
 Messages are untrusted: their sizes are compared with their data before any memory is reserved.
 
+A foxglove.PointCloud is read as well; its points are moved by the pose of the cloud.
+
 Sources: sensor_msgs/PointCloud2, sensor_msgs/PointField; The PCD file format, version 0.7 (Point
 Cloud Library).
 """
@@ -32,6 +34,8 @@ from typing import Any, Final, NamedTuple
 from urc.expressions import quoted
 from urc.model.values import Reading, Signal
 from urc.protocol.values.convert import BadValue, Unusable
+from urc.protocol.values.foxglove_shapes import cloud_of, origin_of
+from urc.protocol.values.transforms import IDENTITY, move_columns
 from urc.protocol.values.vectors import bytes_of
 
 __all__ = ["COLOURS", "POINTS", "Cloud", "cloud_converter", "cloud_message"]
@@ -106,6 +110,8 @@ def cloud_converter(signal: Signal) -> Callable[[object], Reading]:
 
 
 def _cloud(raw: Mapping[str, Any], colour: str, most: int) -> Cloud:
+    origin = origin_of(raw)
+    raw = cloud_of(raw)
     width, height, step, row = (
         _whole(raw, name) for name in ("width", "height", "point_step", "row_step")
     )
@@ -133,6 +139,10 @@ def _cloud(raw: Mapping[str, Any], colour: str, most: int) -> Cloud:
     columns = dict(
         zip(layout.columns, zip(*[unpack(data, at) for at in places], strict=True), strict=True)
     )
+    if origin != IDENTITY:
+        z = columns.get("z") or (0.0,) * len(columns["x"])
+        moved = move_columns(origin, columns["x"], columns["y"], z)
+        columns.update(zip("xyz", map(tuple, moved), strict=True))
     return packed_cloud(frame, layout.colour, count, columns)
 
 

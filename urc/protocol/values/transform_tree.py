@@ -18,6 +18,7 @@ from typing import Any, Final, NamedTuple
 
 from urc.expressions import quoted
 from urc.protocol.values.convert import BadValue, Unusable
+from urc.protocol.values.foxglove_shapes import transforms_of
 from urc.protocol.values.transforms import IDENTITY, Transform, compose, invert
 
 __all__ = [
@@ -90,11 +91,16 @@ class TransformTree:
         self.links.clear()
         self._searched_s = -math.inf
 
+    def forget_stamps(self) -> None:
+        """Drop all timestamps, after the robot's clock was set; the transforms remain."""
+        self.links = {name: one._replace(stamp_s=None) for name, one in self.links.items()}
+
     def update(self, raw: object, now: float, *, is_static: bool = False) -> list[str]:
         """Store the transforms of a message; return descriptions of rejected transforms.
 
         Args:
-            raw: the message's content as a mapping with the list ``transforms``.
+            raw: the message's content as a mapping with the list ``transforms``, or one of the
+                corresponding messages of Foxglove.
             now: time of receipt, in seconds.
             is_static: whether the message is from the topic of static transforms.
 
@@ -103,6 +109,7 @@ class TransformTree:
         """
         if isinstance(raw, Unusable):
             raise BadValue(raw.why)
+        raw = transforms_of(raw)
         found = raw.get("transforms") if isinstance(raw, Mapping) else None
         if not isinstance(found, (list, tuple)):
             raise BadValue("the message has no list of transforms")

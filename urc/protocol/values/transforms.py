@@ -12,7 +12,8 @@ from typing import Final, NamedTuple
 from urc.expressions import quoted
 from urc.protocol.values.convert import BadValue
 
-__all__ = ["IDENTITY", "Transform", "compose", "invert", "transform_points", "transform_pose"]
+__all__ = ["IDENTITY", "Transform", "compose", "invert", "move_columns"]
+__all__ += ["transform_points", "transform_pose"]
 
 
 class Transform(NamedTuple):
@@ -105,6 +106,21 @@ def transform_points(transform: Transform, points: object) -> list[float]:
     found[::2] = [round(tx + a * x + b * y, 4) for x, y in zip(xs, ys, strict=True)]
     found[1::2] = [round(ty + c * x + d * y, 4) for x, y in zip(xs, ys, strict=True)]
     return found
+
+
+def move_columns(
+    transform: Transform, xs: Sequence[float], ys: Sequence[float], zs: Sequence[float]
+) -> tuple[list[float], list[float], list[float]]:
+    """Return points in another frame, as lists of their x, y and z."""
+    a, b, c, tx = *_rotated(transform, 1, 0, 0), transform.x
+    d, e, f, ty = *_rotated(transform, 0, 1, 0), transform.y
+    g, h, i, tz = *_rotated(transform, 0, 0, 1), transform.z
+    points = list(zip(xs, ys, zs, strict=True))
+    return (
+        [tx + a * x + d * y + g * z for x, y, z in points],
+        [ty + b * x + e * y + h * z for x, y, z in points],
+        [tz + c * x + f * y + i * z for x, y, z in points],
+    )
 
 
 def _rotated(by: Transform, x: float, y: float, z: float) -> tuple[float, float, float]:

@@ -284,6 +284,7 @@ class PlaybackSession:
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Refuse the command."""
         raise CommandFailed("not-allowed", REFUSAL)

@@ -69,6 +69,8 @@ class ServerContext(NamedTuple):
     """Options of the driver's subscriptions on a message transport, keyed by topic."""
     taken: Mapping[str, str] = NOTHING
     """Types of the topics that the driver publishes, keyed by topic."""
+    actions: tuple[str, ...] = ()
+    """Names of the actions to which the driver sends goals or cancellations."""
     is_anywhere: bool = False
     """Whether to listen on any free port instead of the configured port."""
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None

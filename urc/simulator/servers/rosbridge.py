@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import hashlib
 import struct
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,6 +17,7 @@ from urc.model.values import NOTHING
 from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
+from urc.transports.ros.rosbridge_cancellations import CANCEL_GOAL
 from urc.transports.ros.types import spelled
 
 __all__ = ["RosbridgeServer"]
@@ -27,6 +29,8 @@ _ENDS = {True: 4, False: 6}
 """Status codes of action results: succeeded or aborted."""
 _CANCELLED = 5
 """Status code of a cancelled goal (action_msgs/GoalStatus)."""
+_UNKNOWN_GOAL = 2
+"""Return code of a cancellation of an unknown goal (action_msgs/CancelGoal)."""
 
 EARLY = 0.1
 """Fraction of the throttle interval by which a message may be early. Robots often send at exactly
@@ -48,13 +52,20 @@ class _Wanted(NamedTuple):
 class Bridge:
     """The state shared by all clients of one bridge."""
 
-    def __init__(self, declared: Mapping[str, str], taken: Mapping[str, str] = NOTHING) -> None:
+    def __init__(
+        self,
+        declared: Mapping[str, str],
+        taken: Mapping[str, str] = NOTHING,
+        actions: Iterable[str] = (),
+    ) -> None:
         """Create the bridge.
 
         Args:
             declared: types of the topics that the robot publishes; "" means an unknown type.
             taken: types of the topics that the robot subscribes to.
+            actions: names of the robot's actions.
         """
+        self.actions = frozenset(actions)
         self.types = dict(declared)
         self.declared = frozenset(declared)
         self.taken = taken
@@ -282,6 +293,8 @@ class BridgeClient:
             self.answer(service, number, known, True)
         elif service in self._bridge.servers:
             self._bridge.passed_on(service, self, number, args)
+        elif service.removesuffix(CANCEL_GOAL) in self._bridge.actions:
+            return self._cancel_all(service, number, args)
         else:
             self._remember(self._calls, number, service)
             attributes = {"service": service, "id": number}
@@ -329,6 +342,28 @@ class BridgeClient:
         action, number = _text(operation, "action"), operation.get("id")
         if not isinstance(number, str | int) or number not in self._bridge.goals:
             return None
+        self._end(action, number)
+        return Envelope("cancel", {"action": action, "id": number})
+
+    def _cancel_all(self, service: str, number: object, args: object) -> Envelope | None:
+        """Answer the hidden service of an action: a zero id cancels the goals of all clients."""
+        bridge, action = self._bridge, service.removesuffix(CANCEL_GOAL)
+        if not _is_zero(args):
+            self.answer(
+                service, number, {"return_code": _UNKNOWN_GOAL, "goals_canceling": []}, True
+            )
+            return None
+        goals = [goal for goal, (_, name) in bridge.goals.items() if name == action]
+        for goal in goals:
+            self._end(action, goal)
+        stamp = {"sec": 0, "nanosec": 0}
+        ids = [list(hashlib.blake2b(str(goal).encode(), digest_size=16).digest()) for goal in goals]
+        listed = [{"goal_id": {"uuid": one}, "stamp": stamp} for one in ids]
+        self.answer(service, number, {"return_code": 0, "goals_canceling": listed}, True)
+        return Envelope("cancel", {"action": action})
+
+    def _end(self, action: str, number: str | int) -> None:
+        """End a goal as cancelled, and send the result to the goal's sender if it is connected."""
         sender, _ = self._bridge.goals.pop(number)
         if sender in self._bridge.clients:
             sender.write(
@@ -341,7 +376,6 @@ class BridgeClient:
                     "result": False,
                 }
             )
-        return Envelope("cancel", {"action": action, "id": number})
 
     def _learn(self, topic: str, operation: Mapping[str, Any]) -> None:
         kind = _text(operation, "type")
@@ -382,6 +416,14 @@ class BridgeClient:
             case "services":
                 return {"services": sorted(self._bridge.servers)}
         return None
+
+
+def _is_zero(args: object) -> bool:
+    """Return whether the request of a cancellation has a zero id; omitted fields are zero."""
+    goal = args.get("goal_info") if isinstance(args, dict) else None
+    info = goal.get("goal_id") if isinstance(goal, dict) else None
+    uuid = info.get("uuid") if isinstance(info, dict) else None
+    return not uuid or (isinstance(uuid, list) and not any(uuid))
 
 
 _Work = Callable[[BridgeClient, Mapping[str, Any], float], Envelope | None]
@@ -453,6 +495,7 @@ class RosbridgeServer(MessageServer):
         self._bridge = Bridge(
             {name: spelled(kind, "msg", ros) for name, kind in types.items()},
             {name: spelled(kind, "msg", ros) for name, kind in context.taken.items()},
+            context.actions,
         )
 
     def _endpoint(self, host: str, port: int) -> Endpoint:

@@ -8,9 +8,12 @@ the port that worked last.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final, Protocol
 
 from urc.model.payload import Envelope, Payload
+from urc.ros_names import namespace_fault
+from urc.transports._faults import one_line
 from urc.transports.base import (
     ConnectFailed,
     GoalRecord,
@@ -25,7 +28,9 @@ from urc.transports.ros.foxglove import FoxgloveTransport
 from urc.transports.ros.foxglove_frames import SUBPROTOCOLS
 from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
+from urc.transports.ros.robot_time import CLOCK_TOPIC, CLOCK_TYPE
 from urc.transports.ros.rosbridge import RosbridgeTransport
+from urc.transports.ros.rosbridge_client import RosSubscription
 from urc.transports.ros.rosbridge_operations import MAX_BYTES
 from urc.transports.websocket import WebSocketTransport
 from urc.transports.zenoh_options import DEFAULT_PORT as ZENOH_PORT
@@ -39,6 +44,9 @@ PORTS: Final[Mapping[str, tuple[int, ...]]] = {
     "auto": (FOXGLOVE_PORT, rosbridge.DEFAULT_PORT),
 }
 """Usual ports for each kind of bridge, in the order in which they are tried."""
+_SHOWN: Final = 60
+_CLOCK: Final = RosSubscription(CLOCK_TOPIC, CLOCK_TYPE, throttle_ms=20, queue_length=1)
+"""Subscription to the simulated time; simulators publish it up to a thousand times a second."""
 _WEBSOCKET: Final = ("auth", "headers")
 """Options that are passed to the WebSocket transport."""
 
@@ -186,6 +194,8 @@ def from_setup(setup: TransportSetup) -> Transport:
     via = options.get("via", "rosbridge")
     if not isinstance(via, str) or via not in PORTS:
         raise TransportError(f"ros: via must be one of {', '.join(PORTS)}, not {via!r}")
+    _check_namespace(options.get("namespace"))
+    _use_sim_time(options.get("use_sim_time"))
     if via == "zenoh":
         from urc.transports.ros import zenoh  # not needed for the bridges
 
@@ -204,20 +214,44 @@ def from_setup(setup: TransportSetup) -> Transport:
     wanted = rosbridge.merged(
         [rosbridge.subscription(one.topic, one.attributes) for one in setup.subscriptions]
     )
+    clock_only = None
+    if _use_sim_time(options.get("use_sim_time")):
+        clock_only = all(one.topic != CLOCK_TOPIC for one in wanted)
+        wanted += (_CLOCK,) if clock_only else ()
     wishes = tuple(TopicWish(one.topic, one.type, one.throttle_ms / 1000) for one in wanted)
     declared = ros if isinstance(ros, int) else None
     candidates, goals = [], UnfinishedGoals()  # STOP after a change of the bridge ends all goals
     for number in PORTS[via] if port is None else (port,):
         where = f"[{host}]:{number}" if ":" in host else f"{host}:{number}"
         wire = _wire(setup, where, offers=via != "rosbridge")
-        foxglove = FoxgloveTransport(wire, where, wishes, declared, goals)
-        other = RosbridgeTransport(wire, where, wanted, ros, goals)
+        foxglove = FoxgloveTransport(wire, where, wishes, declared, goals, clock_only)
+        spare = partial(_wire, setup, where, offers=False)
+        other = RosbridgeTransport(wire, where, wanted, ros, goals, spare, clock_only)
         if via == "rosbridge":
             return other
         if via == "foxglove":
             return foxglove
         candidates.append(Candidate(number, wire, foxglove, other))
     return AnyBridgeTransport(candidates, host if port is None else where, goals)
+
+
+def _check_namespace(given: object) -> None:
+    """Raise `TransportError` if the namespace is invalid; the engine has already applied it."""
+    if given is None:
+        return
+    fault = namespace_fault(given) if isinstance(given, str) else "it must be text"
+    if fault:
+        raise TransportError(
+            f"ros: namespace: {one_line(str(given), _SHOWN)!r} is invalid: {fault}"
+        )
+
+
+def _use_sim_time(given: object) -> bool:
+    """Return the option ``use_sim_time``; raise `TransportError` if it is invalid."""
+    if given not in (None, True, False):
+        shown = one_line(str(given), _SHOWN)
+        raise TransportError(f"ros: use_sim_time must be true or false, not {shown!r}")
+    return given is True
 
 
 def _wire(setup: TransportSetup, where: str, *, offers: bool) -> WebSocketTransport:

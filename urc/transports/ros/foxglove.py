@@ -20,6 +20,7 @@ from typing import Final
 
 from urc.model.payload import Envelope, Payload
 from urc.transports.base import NOTICE, ConnectFailed, GoalRecord, PeerClosed, TransportError
+from urc.transports.ros.foxglove_publishing import PublishedType
 from urc.transports.ros.foxglove_session import KNOWN_TOPICS, FoxgloveSession
 from urc.transports.ros.foxglove_topics import TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
@@ -51,6 +52,7 @@ class FoxgloveTransport:
         wishes: tuple[TopicWish, ...] = (),
         ros: int | None = None,
         goals: UnfinishedGoals | None = None,
+        clock_only: bool | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -60,13 +62,15 @@ class FoxgloveTransport:
             wishes: topics to subscribe to, without duplicates.
             ros: ROS version declared in the document; None if undeclared.
             goals: record of unfinished goals that other transports share; None for a new record.
+            clock_only: see `RobotTime`.
         """
         self._wire = wire
         self._where = where
         self._wishes = wishes
         self._graph = TopicGraph(self._log, ros)
-        self._published: dict[tuple[str, str], str] = {}
+        self._published: dict[tuple[str, str], PublishedType] = {}
         self._goals = UnfinishedGoals() if goals is None else goals
+        self._clock_only = clock_only
         self._session: FoxgloveSession | None = None
         self._tasks: list[asyncio.Task[None]] = []
         self._greeted = asyncio.Event()
@@ -105,6 +109,7 @@ class FoxgloveTransport:
             clock=loop.time,
             published=self._published,
             goals=self._goals,
+            clock_only=self._clock_only,
             flush=self._news.set,
         )
         self._tasks = [

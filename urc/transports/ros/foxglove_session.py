@@ -42,10 +42,11 @@ from urc.transports.ros.foxglove_frames import (
     publish_frame,
     service_of,
 )
+from urc.transports.ros.foxglove_publishing import PublishedType, message_data, message_json
 from urc.transports.ros.foxglove_topics import FoxgloveTopics, TopicWish
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
-from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosapi_answers import RosapiAnswers
 from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
@@ -66,7 +67,7 @@ MAX_RETRIES: Final = 5
 """Maximum number of retries after a subscription is refused."""
 _NUMBERS: Final = re.compile(r"\d+")
 _SHOWN: Final = 80
-_ENCODINGS: Final = ("cdr", "ros1", "json")
+_ENCODINGS: Final = ("cdr", "ros1", "json", "protobuf", "flatbuffer")
 PARAMETER: Final = "parameter:"
 """Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 
@@ -98,8 +99,9 @@ class FoxgloveSession:
         *,
         call_at: Callable[[float, Callable[[], None]], object],
         clock: Callable[[], float],
-        published: dict[tuple[str, str], str],
+        published: dict[tuple[str, str], PublishedType],
         goals: UnfinishedGoals | None = None,
+        clock_only: bool | None = None,
         flush: Callable[[], object] = lambda: None,
     ) -> None:
         """Initialise the state for a new connection.
@@ -110,10 +112,10 @@ class FoxgloveSession:
             graph: object that reports topics with mistakes.
             call_at: function that schedules a call for a given time on `clock`.
             clock: monotonic clock, in seconds.
-            published: type of each published topic, keyed by topic and encoding. The mapping
-                persists across connections, so that a new connection announces all these topics
-                immediately.
+            published: type of each published topic, keyed by topic and encoding. All connections
+                of a transport share it, so that a new one announces these topics at once.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
+            clock_only: see `RobotTime`.
             flush: function that sends the written frames soon.
         """
         self.queue = queue
@@ -133,7 +135,6 @@ class FoxgloveSession:
         self._own: dict[tuple[str, str], int] = {}
         self._calls: dict[int, tuple[object, str]] = {}
         self._own_calls: dict[int, Callable[[ServiceReply | None, str], None]] = {}
-        """Functions that receive the replies to the session's own calls."""
         self._results: dict[int, str] = {}
         """Goal of each pending call for a result, keyed by the call's number."""
         self._flush = flush
@@ -142,7 +143,7 @@ class FoxgloveSession:
         self._graph_topics = FoxgloveTopics()
         self._published_s = float("-inf")
         self._number = 0
-        self._time = RobotTime()
+        self._time = RobotTime(clock_only)
         self._told: set[str] = set()
         self._retries: Counter[str] = Counter()
         self._bad = 0
@@ -208,7 +209,7 @@ class FoxgloveSession:
             self._op("subscribeConnectionGraph")
         for (topic, encoding), kind in self._published.items():
             self._announce(topic, encoding, kind)
-            self._graph_topics.announced(topic, kind, ())
+            self._graph_topics.announced(topic, kind.name, ())
         names = [topic[len(PARAMETER) :] for topic in self._wishes if topic.startswith(PARAMETER)]
         if names and "parametersSubscribe" in self.capabilities:
             self._op("subscribeParameterUpdates", parameterNames=names)
@@ -289,6 +290,12 @@ class FoxgloveSession:
         self._time.told(said.time_ns, time.time_ns())
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
+        if self._time.is_simulated and one.wish.topic == CLOCK_TOPIC:
+            restarted = self._time.clock(one.channel.encoding, said.data)
+            if restarted is not None:
+                self.queue.answer(restarted)
+            if self._time.is_clock_only:
+                return
         throttle_s = one.wish.throttle_s
         if not throttle_s:
             self.queue.message(one.wish.topic, envelope, len(said.data))
@@ -449,27 +456,18 @@ class FoxgloveSession:
             raise TransportError(
                 "the bridge accepts no messages: it lacks the capability clientPublish"
             )
-        encoding, data = str(said.get("encoding") or ""), said.get("data")
-        if not isinstance(data, bytes) or (self.encodings and encoding not in self.encodings):
-            if self.encodings and "json" not in self.encodings:
-                known = ", ".join(self.encodings)
-                raise TransportError(
-                    f"the type {kind} of {topic} is unknown; the bridge accepts {known}"
-                )
-            encoding, data = "json", self._as_json(envelope.body)
-        elif stamps := said.get("stamps"):
-            data = self._time.stamped(data, stamps, time.time_ns())  # type: ignore[arg-type]
+        encoding, data, schema = message_data(envelope, self.encodings, self._time)
         number = self._own.get((topic, encoding))
         if number is None:
             kind = spelled(kind, "msg", 1 if encoding == "ros1" else 2)
-            number = self._announce(topic, encoding, kind)
+            number = self._announce(topic, encoding, PublishedType(kind, schema))
             self._graph_topics.announced(topic, kind, self._channels.values())
             self._graph.learn({one.topic: one.type for one in self._channels.values()})
             if self._graph.publishes(topic, kind) and self.has_graph:
                 self._graph.subscribers(topic, self.listeners(topic) or ())
         self._frames.append((publish_frame(number, data), False))
 
-    def _announce(self, topic: str, encoding: str, kind: str) -> int:
+    def _announce(self, topic: str, encoding: str, kind: PublishedType) -> int:
         while len(self._own) >= KNOWN_TOPICS:
             oldest = next(iter(self._own))
             self._op("unadvertise", channelIds=[self._own.pop(oldest)])
@@ -477,22 +475,11 @@ class FoxgloveSession:
         self._number += 1
         self._own[topic, encoding] = self._number
         self._published[topic, encoding] = kind
-        one = {"id": self._number, "topic": topic, "encoding": encoding, "schemaName": kind}
+        one = {"id": self._number, "topic": topic, "encoding": encoding, "schemaName": kind.name}
+        if kind.schema:
+            one |= {"schema": kind.schema, "schemaEncoding": encoding}
         self._op("advertise", channels=[one])
         return self._number
-
-    def _as_json(self, body: object) -> bytes:
-        seconds, nanos = self._time.now(time.time_ns())
-
-        def timed(value: Any) -> Any:
-            if isinstance(value, Mapping):
-                return {name: timed(inner) for name, inner in value.items()}
-            return {"sec": seconds, "nanosec": nanos} if value == "now" else value
-
-        try:
-            return encode_operation(timed({} if body is None else body))
-        except BadOperation as problem:
-            raise TransportError(str(problem)) from problem
 
     def _call(self, envelope: Envelope) -> None:
         said = envelope.attributes
@@ -507,7 +494,7 @@ class FoxgloveSession:
             self.return_unencoded(service, {"id": number}, envelope.body)
             return
         if encoding == "json":
-            data = self._as_json(envelope.body)
+            data = message_json(envelope.body, self._time)
         if goal := said.get("goal"):
             self._actions.send(str(goal), number, service, data)
             return

@@ -38,12 +38,14 @@ from urc.transports.base import (
     TOPICS,
     ConnectFailed,
     GoalRecord,
+    MissingPackage,
     PeerClosed,
     TransportError,
 )
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph, version_of
 from urc.transports.ros.rosapi_topics import RosapiTopics
+from urc.transports.ros.rosbridge_cancellations import ActionCancellations, CancelWire
 from urc.transports.ros.rosbridge_cells import LARGE_BYTES, packed_operation
 from urc.transports.ros.rosbridge_client import KNOWN_TOPICS, RosClient, RosSubscription
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader
@@ -79,6 +81,8 @@ class RosbridgeTransport:
         subscriptions: tuple[RosSubscription, ...] = (),
         ros: int | Literal["auto"] | None = None,
         goals: UnfinishedGoals | None = None,
+        spare: Callable[[], CancelWire] | None = None,
+        clock_only: bool | None = None,
     ) -> None:
         """Initialise without connecting.
 
@@ -89,11 +93,16 @@ class RosbridgeTransport:
             ros: ROS version, 1 or 2, which determines the form of type names; "auto" for the
                 bridge's version; None to keep names as written.
             goals: record of unfinished goals that other transports share; None for a new record.
+            spare: function that returns a new transport to the same bridge, for calls that may
+                block a connection; None to make no such calls.
+            clock_only: see `RobotTime`.
         """
         self._wire = wire
+        self._spare = spare
         self._where = where
         self._subscriptions = subscriptions
         self._ros = ros
+        self._clock_only = clock_only
         self._session: _Session | None = None
         self._graph = TopicGraph(self._log, None if ros == AUTO else ros)
         self._goals = UnfinishedGoals() if goals is None else goals
@@ -116,7 +125,15 @@ class RosbridgeTransport:
     async def begin(self, timeout_s: float) -> None:
         """Subscribe over the open WebSocket; raise `ConnectFailed` on failure."""
         packed = frozenset(one.topic for one in self._subscriptions if one.is_packed)
-        session = self._session = _Session(self._wire, self._ros, self._graph, self._goals, packed)
+        session = self._session = _Session(
+            self._wire,
+            self._ros,
+            self._graph,
+            self._goals,
+            packed,
+            self._spare,
+            self._clock_only,
+        )
         try:
             async with asyncio.timeout(timeout_s):
                 await session.start(self._subscriptions, min(_ANSWER_S, timeout_s * _PART))
@@ -200,6 +217,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
 
     Raises:
         TransportError: an option is invalid.
+        MissingPackage: the extra for `compression: cbor` is not installed.
     """
 
     def number(name: str, factor: float = 1) -> int:
@@ -215,7 +233,7 @@ def subscription(topic: str, attributes: Mapping[str, Value]) -> RosSubscription
         text = f"ros: compression of {topic} must be none, png or cbor, not {compression!r}"
         raise TransportError(text)
     if compression == "cbor" and find_spec("cbor2") is None:
-        raise TransportError(missing("cbor needs", "cbor2", "cbor"))
+        raise MissingPackage(missing("cbor needs", "cbor2", "cbor"))
     return RosSubscription(
         topic,
         str(attributes.get("type") or ""),
@@ -251,14 +269,23 @@ class _Session:
         graph: TopicGraph,
         goals: UnfinishedGoals,
         packed: frozenset[str],
+        spare: Callable[[], CancelWire] | None,
+        clock_only: bool | None,
     ) -> None:
         self.queue = TopicReceiveQueue()
         self._wire = wire
         clock = asyncio.get_running_loop().time
-        self._client = RosClient(self.queue, None if ros == AUTO else ros, goals, clock)
+        version = None if ros == AUTO else ros
+        self._client = RosClient(self.queue, version, goals, clock, clock_only)
         self._cancelled = asyncio.Event()
         """Event that is set after goals were cancelled."""
         self._canceller: asyncio.Task[None] | None = None
+        self._goals = goals
+        self._told: set[str] = set()
+        self._all: ActionCancellations | None = None
+        if spare is not None and ros != 1:
+            client = self._client
+            self._all = ActionCancellations(spare, client.owes, client.all_cancelled, self._tell)
         self._is_auto = ros == AUTO
         self._frames = OperationReader(packed)
         self._packed = packed
@@ -281,6 +308,8 @@ class _Session:
         self._reader = asyncio.create_task(self._read())
         await self._write(self._client.cancel_due())
         self._canceller = asyncio.create_task(self._cancel_again())
+        for action in self._goals.owed():
+            self._cancel_all(action)
         # Query first: later, ROS 1 would include our own subscriptions.
         asked = self._client.call_service(
             "/rosapi/topics", lambda said: self._learn(subscriptions, said), errback=self._unknown
@@ -310,9 +339,27 @@ class _Session:
                 self._fresh[topic] = None
             if self._learnt.is_set():
                 frames += self._look_at(topic, str(envelope.attributes.get("type") or ""))
+        action = str(envelope.attributes.get("action"))
+        if envelope.verb == "goal" and self._all is not None:
+            self._all.drop(action)  # it would end the new goal, too
         if envelope.verb == "cancel":
             self._cancelled.set()
-        await self._write(frames)
+        try:
+            await self._write(frames)
+        finally:
+            if envelope.verb == "cancel":
+                self._cancel_all(action)
+
+    def _cancel_all(self, action: str) -> None:
+        """Cancel all goals of an action, also those that URC does not know."""
+        if self._all is not None:
+            self._all.begin(action)
+
+    def _tell(self, text: str) -> None:
+        """Write a line to the robot's log, once per connection."""
+        if text not in self._told and len(self._told) < KNOWN_TOPICS:
+            self._told.add(text)
+            self.queue.answer(Envelope(NOTICE, {}, text))
 
     async def _cancel_again(self) -> None:
         """Repeat the cancellations of goals without results, until cancelled."""
@@ -404,6 +451,8 @@ class _Session:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        if self._all is not None:
+            await self._all.end()
 
     async def _write(self, frames: list[bytes]) -> None:
         for frame in frames:

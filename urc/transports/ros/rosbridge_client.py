@@ -23,8 +23,9 @@ from roslibpy.event_emitter import EventEmitterMixin
 from urc.model.payload import Envelope
 from urc.model.values import NOTHING
 from urc.transports._faults import one_line
-from urc.transports.base import NOTICE, TransportError
+from urc.transports.base import TransportError
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
+from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
 from urc.transports.ros.types import spelled
 from urc.transports.topic_queue import TopicReceiveQueue
@@ -59,6 +60,7 @@ class RosClient:
         ros: int | None,
         goals: UnfinishedGoals | None = None,
         clock: Callable[[], float] = time.monotonic,
+        clock_only: bool | None = None,
     ) -> None:
         """Initialise the state for a new connection.
 
@@ -67,7 +69,10 @@ class RosClient:
             ros: ROS version of type names; None keeps names as written.
             goals: unfinished goals of this and earlier connections; None for no earlier goals.
             clock: monotonic clock, in seconds.
+            clock_only: None if the bridge replaces ``now`` by its own time; otherwise, see
+                `RobotTime`.
         """
+        self._time = RobotTime(clock_only)
         self._queue = queue
         self._ros_version = ros
         self._protocol = _Protocol()
@@ -82,8 +87,10 @@ class RosClient:
         """
         self._listened: dict[str, tuple[RosSubscription, _Topic]] = {}
         """Topics that were subscribed on this connection."""
-        self._told: set[str] = set()
-        """Actions for which a `cancel` without a known goal was reported."""
+        self._own: dict[str, None] = {}
+        """Goals of this connection whose results have not arrived, oldest first."""
+        self._all_cancelled: set[str] = set()
+        """Actions of which the robot has answered the cancellation of all goals."""
         self.received: dict[str, int] = {}
         """Number of received messages, keyed by subscribed topic."""
 
@@ -182,6 +189,8 @@ class RosClient:
 
     def _publish(self, attributes: Mapping[str, object], body: object) -> None:
         name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
+        if self._time.is_simulated:
+            body = self._time.timed(body, time.time_ns())
         if not kind:  # the bridge can find the type if another client uses the topic
             operation = {"op": "publish", "topic": name, "msg": _fields(body)}
             self._protocol.send_ros_message(Message(operation))
@@ -227,6 +236,9 @@ class RosClient:
         )
         self._goals.settle(name)
         self._goals.add(goal, name)
+        while len(self._own) >= MAX_PENDING:
+            del self._own[next(iter(self._own))]
+        self._own[goal] = None
 
     def _cancel(self, attributes: Mapping[str, object], body: object) -> None:
         """Cancel all unfinished goals of an action, including those of earlier connections."""
@@ -234,21 +246,49 @@ class RosClient:
         goals = [one for one in self._goals.cancel(name) if not is_ros_id(one)]
         for goal in goals:
             self._cancel_goal(goal, name)
-        if not goals and name not in self._told and len(self._told) < KNOWN_TOPICS:
-            self._told.add(name)
-            text = (
-                f"no unfinished goal of {one_line(name, _NAME_SHOWN)} is known: none is cancelled, "
-                "and a goal of another program goes on"
-            )
-            self._queue.answer(Envelope(NOTICE, {}, text))
+        self._all_cancelled.discard(name)
+
+    def owes(self, action: str) -> bool:
+        """Return whether the robot still owes the cancellation of all goals of an action."""
+        return self._goals.owes(action) and action not in self._all_cancelled
+
+    def all_cancelled(self, action: str, is_cancelling: bool) -> bool:
+        """Note the robot's answer to the cancellation of all goals of an action.
+
+        The answer proves nothing about a goal that the bridge has not passed on yet. The result of
+        each goal of this connection must therefore arrive, too.
+
+        Args:
+            action: name of the action.
+            is_cancelling: whether the robot has listed goals that it now cancels.
+
+        Returns:
+            Whether the answer ends the repetition. rclpy reports a refusal as success without
+            goals. This is no answer while a goal of this connection goes on.
+        """
+        if not is_cancelling and self._is_followed(action):
+            return False
+        self._all_cancelled.add(action)
+        self._settle(action)
+        return True
+
+    def _is_followed(self, action: str) -> bool:
+        """Return whether a cancelled goal of this connection has no result yet."""
+        goals = self._goals.cancelled()
+        return any(name == action and goal in self._own for goal, name in goals)
+
+    def _settle(self, action: str) -> None:
+        """End the cancellation of an action if all its answers have arrived."""
+        if action in self._all_cancelled and not self._is_followed(action):
+            self._all_cancelled.discard(action)
+            self._goals.settle(action)
 
     def _finish(self, goal: str) -> None:
-        """Forget an ended goal; the last cancelled goal of an action answers its cancellation."""
+        """Forget an ended goal, whose result may be the last missing answer."""
         action = self._goals.action(goal)
-        is_cancelled = self._goals.is_cancelled(goal)
+        self._own.pop(goal, None)
         self._goals.finish(goal)
-        if is_cancelled and action not in dict(self._goals.cancelled()).values():
-            self._goals.settle(action)
+        self._settle(action)
 
     def _cancel_goal(self, goal: str, action: str, wait_s: float = FIRST_S) -> None:
         self._repeats[goal] = self._clock() + wait_s, longer(wait_s)
@@ -268,6 +308,12 @@ class RosClient:
     def _message(self, topic: str, body: object) -> None:
         envelope = Envelope("message", {"topic": topic}, body)
         self.received[topic] += 1
+        if self._time.is_simulated and topic == CLOCK_TOPIC:
+            restarted = self._time.clock(None, body)
+            if restarted is not None:
+                self._queue.answer(restarted)
+            if self._time.is_clock_only:
+                return
         self._queue.message(topic, envelope, self._size_bytes)
 
     def _answer(self, number: object, is_ok: bool, values: object) -> None:

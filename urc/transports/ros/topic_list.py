@@ -119,4 +119,4 @@ def _tuple(value: object) -> object:
 def short_type(kind: str) -> str:
     """Return a type name in the short form ``pkg/Type``, which ROS 1 and ROS 2 have in common."""
     words = kind.split("/")
-    return f"{words[0]}/{words[-1]}"
+    return f"{words[0]}/{words[-1]}" if len(words) > 1 else kind

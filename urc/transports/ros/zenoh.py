@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from urc._extras import missing
 from urc.transports._stream_dialer import StreamDialer
-from urc.transports.base import Transport, TransportError, TransportSetup
+from urc.transports.base import MissingPackage, Transport, TransportSetup
 from urc.transports.ros.zenoh_options import read_ros_options
 
 __all__ = ["from_setup"]
@@ -17,13 +17,14 @@ def from_setup(setup: TransportSetup) -> Transport:
     """Return a transport for a document's options; see docs/transports/ros-zenoh.md.
 
     Raises:
-        TransportError: an option is missing or invalid, or the library is missing.
+        TransportError: an option is missing or invalid.
+        MissingPackage: a library is not installed.
     """
     options = read_ros_options(setup)
     for package in ("zenoh", "xxhash"):
         if find_spec(package) is None:
             name = "eclipse-zenoh" if package == "zenoh" else package
-            raise TransportError(missing("ros over zenoh needs", name, "zenoh"))
+            raise MissingPackage(missing("ros over zenoh needs", name, "zenoh"))
     from urc.transports.ros.zenoh_client import RosZenohTransport  # imports the library
 
     place = options.zenoh

@@ -28,7 +28,7 @@ from urc.transports._faults import CLOSED, late, one_line
 from urc.transports._stream_dialer import StreamDialer
 from urc.transports.base import NOTICE, TOPICS, ConnectFailed, PeerClosed, TransportError
 from urc.transports.ros.graph import TopicGraph
-from urc.transports.ros.robot_time import RobotTime
+from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.topic_list import QUIET_S
 from urc.transports.ros.types import spelled
 from urc.transports.ros.zenoh_names import (
@@ -220,7 +220,7 @@ class _RosNode:
         self._fresh: dict[str, None] = {}
         """Published topics whose subscribers have not been checked."""
         self._tokens: dict[str, TopicToken] = {}
-        self._time = RobotTime()
+        self._time = RobotTime(options.clock_only)
         self._loop = asyncio.get_running_loop()
         self._timers: list[asyncio.TimerHandle] = []
 
@@ -299,6 +299,12 @@ class _RosNode:
         if not self._is_wanted(one, kind):
             return
         one.received += 1
+        if self._time.is_simulated and one.topic.topic == CLOCK_TOPIC:
+            restarted = self._time.clock("cdr", data)
+            if restarted is not None:
+                self.session.queue.answer(restarted)
+            if self._time.is_clock_only:
+                return
         now_s = self._loop.time()
         if one.topic.throttle_s and now_s < one.due_s:
             if one.late is None:

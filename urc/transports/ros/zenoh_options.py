@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 
 from urc.key_expressions import key_fault
 from urc.transports.base import TransportError, TransportSetup
+from urc.transports.ros.robot_time import CLOCK_TOPIC, CLOCK_TYPE
 from urc.transports.zenoh_options import ZenohOptions, read_options
 
 __all__ = ["DISTROS", "Ros2Options", "Ros2Topic", "read_ros_options"]
@@ -35,6 +36,9 @@ class Ros2Options(NamedTuple):
     domain: int = 0
     has_hashes: bool = True
     """Whether keys contain the hashes of types; False for ROS 2 Humble."""
+    clock_only: bool | None = None
+    """None for the robot's own time. Otherwise, the time is that of the topic ``/clock``, and true
+    means that the driver does not read this topic."""
 
 
 def read_ros_options(setup: TransportSetup) -> Ros2Options:
@@ -59,4 +63,8 @@ def read_ros_options(setup: TransportSetup) -> Ros2Options:
         throttle_s = float(throttle) if isinstance(throttle, int | float) else 0.0
         kind, hashed = str(said.get("type") or ""), str(said.get("hash") or "")
         topics.append(Ros2Topic(one.topic, kind, throttle_s, hashed))
-    return Ros2Options(zenoh, tuple(topics), domain, distro != "humble")
+    clock_only = None
+    if setup.options.get("use_sim_time") is True:
+        clock_only = all(one.topic != CLOCK_TOPIC for one in topics)
+        topics += [Ros2Topic(CLOCK_TOPIC, CLOCK_TYPE)] if clock_only else []
+    return Ros2Options(zenoh, tuple(topics), domain, distro != "humble", clock_only)

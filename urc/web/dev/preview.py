@@ -12,11 +12,11 @@ from urc.model import sequence
 from urc.model.driver import Command, Driver
 from urc.model.payload import Payload, WriteSpec
 from urc.problems import UrcError
+from urc.protocol.forms.topics import context_of
 from urc.protocol.framing.table import build_framing
 from urc.protocol.requests.encode import build_encode, check_arguments
 from urc.protocol.requests.rate import Counters
 from urc.protocol.sequences.commands import questions
-from urc.protocol.values.payload import CodecContext
 
 __all__ = ["Preview", "PreviewLine", "preview"]
 
@@ -131,7 +131,7 @@ def _written(
     names: Mapping[str, object],
 ) -> PreviewLine:
     spec = driver.transports[transport]
-    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
+    context = context_of(spec, settings)
     if COUNTERS in send.names:
         names = {**names, COUNTERS: Counters().draw()}
     try:

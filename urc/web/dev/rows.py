@@ -69,7 +69,7 @@ def traffic_row(traffic: Traffic) -> TrafficRow:
 
 def note_row(note: LogEntry) -> TrafficRow:
     """Return a traffic row for a fault or a state change."""
-    return TrafficRow(0, note.time_s, "note", note.source, level=note.level, text=cut(note.text))
+    return TrafficRow(0, note.time_s, "note", note.place, level=note.level, text=cut(note.text))
 
 
 def fill(row: TrafficRow, envelope: Envelope) -> None:

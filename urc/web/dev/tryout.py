@@ -17,12 +17,12 @@ from urc.model.sequence import ExpectStep, all_steps
 from urc.patterns import Pattern
 from urc.problems import UrcError
 from urc.protocol.forms.table import build_reader
-from urc.protocol.forms.topics import frame_of, topic_of
+from urc.protocol.forms.topics import context_of, frame_of, namespace_of, topic_of
 from urc.protocol.framing.base import FrameFault
 from urc.protocol.framing.table import build_framing
 from urc.protocol.readings.readings import Readings
 from urc.protocol.requests.reply_match import CompiledReply, Expectation, Matcher
-from urc.protocol.values.payload import BadItem, BadText, CodecContext, Frame
+from urc.protocol.values.payload import BadItem, BadText, Frame
 
 __all__ = ["MOST_BYTES", "ParseResult", "ParsedPiece", "FrameConsumer", "pasted_bytes", "try_out"]
 
@@ -228,10 +228,10 @@ def _why_not(
 ) -> str:
     """Return the reason why a frame does not match a reader, for display."""
     read = one.read
-    if read.topic is not None and (topic := topic_of(read, settings)) != frame.topic:
+    if read.topic is not None and (topic := _topic(read, spec, settings)) != frame.topic:
         came = "a reply" if frame.topic is None else repr(frame.topic)
         return f"expected the topic {topic!r}, found {came}"
-    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
+    context = context_of(spec, settings)
     try:
         found = build_reader(read._replace(when=None), context).read(frame)
     except (BadItem, BadText) as error:
@@ -246,11 +246,15 @@ def _why_not(
     return f"the frame cannot be decoded as {read.form}"
 
 
+def _topic(read: ReadSpec, spec: TransportSpec, settings: Mapping[str, object]) -> str:
+    return topic_of(read, settings, namespace_of(spec, settings))
+
+
 def _candidates(
     driver: Driver, spec: TransportSpec, settings: Mapping[str, object]
 ) -> list[_Candidate]:
     readings = Readings(driver.signals, {"settings": settings})
-    context = CodecContext(spec.encoding, settings, has_keys=spec.has_keys)
+    context = context_of(spec, settings)
 
     def matcher(read: ReadSpec) -> Matcher:
         return Matcher(build_reader(read, context), readings.decoder(read.fields))

@@ -7,7 +7,7 @@ exactly one outcome and one audit log entry.
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 from typing import Final, NamedTuple, Protocol
 
 from urc.model.payload import Payload
@@ -23,6 +23,7 @@ from urc.runtime.one_shot_commands import (
     role_refusal,
     starts_motion,
 )
+from urc.runtime.running_goals import RunningGoal, action_of, places_of
 from urc.runtime.session import CommandFailed
 from urc.web.drive.control_service import ControlService, OperatorSession
 from urc.web.drive.two_person import TwoPersonRule
@@ -32,6 +33,9 @@ __all__ = ["COMMAND_TIMEOUT_S", "CommandOutcome", "CommandRunner", "CommandTarge
 
 COMMAND_TIMEOUT_S: Final = 30.0
 """Longest wait for the reply to a command that does not declare a longer one, in seconds."""
+LOST: Final = ("disconnected", "timed-out", "stopped")
+"""Codes of failures after which a robot may still be on its way to a goal."""
+NOT_AWAITED: Final = "the page or program that sent the command no longer waits for its reply"
 
 
 class CommandTarget(Protocol):
@@ -48,6 +52,7 @@ class CommandTarget(Protocol):
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
@@ -74,6 +79,8 @@ class CommandRunner:
         self._controls = controls
         self._consent = consent
         self._clock = clock
+        self._followed: set[asyncio.Task[Replied | CommandFailed]] = set()
+        """Commands with autonomous motion that have not ended."""
 
     async def run(
         self,
@@ -94,17 +101,14 @@ class CommandRunner:
         """
         sent: deque[Payload] = deque(maxlen=1)  # the last sent frame
         people: tuple[str, ...] = ()
+        is_over = False
         limit_s = self._limit_s(asked.command) if timeout_s is None else timeout_s
         try:
             people = await self._confirmed(operator, asked)
             async with asyncio.timeout(limit_s):
-                with (
-                    self._ended_with_right(operator, asked.command, target),
-                    self._shown_as_motion(asked, target),
-                ):
-                    replied = await target.command(
-                        asked.command, asked.arguments, confirmed_by=people, on_sent=sent.append
-                    )
+                with self._ended_with_right(operator, asked.command, target):
+                    unless = self._late_check(operator, asked, lambda: is_over)
+                    replied = await self._replied(operator, asked, target, people, sent, unless)
         except asyncio.CancelledError:
             recorder = self._controls.recorder
             text = "no client waited for the answer"
@@ -118,6 +122,8 @@ class CommandRunner:
             outcome = CommandOutcome(code=failed.code, message=failed.message)
         else:
             outcome = CommandOutcome(replied.values)
+        finally:
+            is_over = True
         self._record(operator, asked, outcome, people, _last(sent))
         return outcome
 
@@ -151,14 +157,89 @@ class CommandRunner:
         finally:
             operator.on_role.discard(check)
 
-    def _shown_as_motion(
-        self, asked: CommandRequest, target: CommandTarget
-    ) -> AbstractContextManager[None]:
-        """Tell all pages of autonomous motion until the reply to its command."""
+    async def _replied(
+        self,
+        operator: OperatorSession,
+        asked: CommandRequest,
+        target: CommandTarget,
+        people: tuple[str, ...],
+        sent: deque[Payload],
+        unless: Callable[[], str] | None,
+    ) -> Replied:
+        """Run a command and return its reply.
+
+        Autonomous motion is shown on all pages until its reply, even if its own page is closed:
+        the robot goes on. A command that has not been sent by then fails (`unless`).
+        """
         known = self._controls.once.driver.commands.get(asked.command)
         if known is None or not starts_motion(known, asked.arguments):
-            return nullcontext()
-        return target.hub.moved_by(asked.command)
+            replied = await target.command(
+                asked.command,
+                asked.arguments,
+                confirmed_by=people,
+                on_sent=sent.append,
+                unless=unless,
+            )
+            if action := action_of(_last(sent), "cancel"):
+                target.hub.settle_goals(action)
+            return replied
+        following = self._follow(operator, asked, target, people, sent, unless)
+        task = asyncio.create_task(following)
+        self._followed.add(task)
+        task.add_done_callback(self._followed.discard)
+        outcome = await asyncio.shield(task)
+        if isinstance(outcome, CommandFailed):
+            raise outcome
+        return outcome
+
+    async def _follow(
+        self,
+        operator: OperatorSession,
+        asked: CommandRequest,
+        target: CommandTarget,
+        people: tuple[str, ...],
+        sent: deque[Payload],
+        unless: Callable[[], str] | None,
+    ) -> Replied | CommandFailed:
+        """Run a command that starts motion, and show it on all pages until it has ended."""
+        client, hub, loop = operator.client, target.hub, asyncio.get_running_loop()
+        goal = RunningGoal(
+            0,
+            asked.command,
+            places_of(asked.arguments),
+            client.name,
+            client.id,
+            self._clock.now(),
+        )
+        number, is_lost = hub.begin_goal(goal), True
+
+        def on_sent(payload: Payload) -> None:
+            sent.append(payload)
+            # Later, because the engine is at work now.
+            loop.call_soon(hub.sent_goal, number, action_of(payload, "goal"))
+
+        try:
+            replied = await target.command(
+                asked.command,
+                asked.arguments,
+                confirmed_by=people,
+                on_sent=on_sent,
+                unless=unless,
+            )
+            is_lost = False
+        except CommandFailed as failed:
+            is_lost = failed.code in LOST
+            return failed
+        finally:
+            hub.end_goal(number, is_lost=is_lost)
+        return replied
+
+    async def end(self) -> None:
+        """Stop following the motion of a session that has ended."""
+        tasks = tuple(self._followed)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
     def _limit_s(self, command: str) -> float | None:
         driver = self._controls.once.driver
@@ -183,6 +264,36 @@ class CommandRunner:
         if not operator.rights.may_give(asked.command):
             raise CommandRefused("refused", OUT_OF_SCOPE)
         self._controls.once.admit(operator.client, asked.command, asked.arguments, asked.stops)
+
+    def _late_check(
+        self, operator: OperatorSession, asked: CommandRequest, is_over: Callable[[], bool]
+    ) -> Callable[[], str] | None:
+        """Return the check of a command that starts motion at the moment of its sending.
+
+        The command may wait in a queue, and a goal may wait for its services. Meanwhile, the
+        operator may lose the right, another operator may take the lease, or the page may be closed.
+        Other commands are not checked: a command that stops the robot is always sent.
+        """
+        known = self._controls.once.driver.commands.get(asked.command)
+        if known is None or known.stops:
+            return None
+        is_goal = known.send.options.get("verb") == "goal"
+        if not is_goal and not starts_motion(known, asked.arguments):
+            return None
+        stops = asked.stops
+        if stops is None:
+            stops = self._controls.controller.lease.state.stops
+
+        def check() -> str:
+            """Read the rights only: the engine, which asks, must not be called from here."""
+            if is_over() and not known.steps:  # a sequence goes on without its page
+                return NOT_AWAITED
+            if not operator.rights.may_give(asked.command):
+                return OUT_OF_SCOPE
+            client = operator.client._replace(role=operator.rights.role())
+            return self._controls.once.refusal(client, asked.command, asked.arguments, stops)
+
+        return check
 
     def _record(
         self,

@@ -238,7 +238,8 @@ class Fanout:
             messages.append(self._take_log(hub.notes_count - notes, now_s).encode())
         if progress != hub.progress_count:
             sequences = tuple(hub.progress.values())
-            messages.append(encode_progress(sequences, self._moving()).encode())
+            goals = tuple(hub.goals)
+            messages.append(encode_progress(sequences, self._moving(), goals, now_s).encode())
         if mismatches != hub.mismatches_count:
             messages.append(encode_topics(hub.topic_mismatches).encode())
         after = FanoutPosition(
@@ -255,7 +256,8 @@ class Fanout:
     def _moving(self) -> list[str]:
         """Return the commands and sequences that now move the robot, in order of their names."""
         running = {name for name, one in self.hub.progress.items() if one.state != "idle"}
-        return sorted({*self.hub.moving, *(running & self._movers)})
+        goals = {goal.command for goal in self.hub.goals}  # a lost goal may go on
+        return sorted(goals | (running & self._movers))
 
     def _without_pictures(self, samples: Sequence[Sample]) -> Sequence[Sample]:
         """Remove images, which are sent separately; keep samples without a value."""

@@ -121,6 +121,7 @@ class SessionLike(MotionSession, Protocol):
         *,
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
+        unless: Callable[[], str] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
@@ -458,6 +459,7 @@ class RobotService:
                 self._next = None
             self._keep_picture(session.hub)
             self.controls.recorder.attend(None, self.clock.now)
+            await self.commands.end()
             live.ended.set()
             live.fanout.flush()  # wakes every client, so that each sees the end
 

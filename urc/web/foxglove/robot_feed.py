@@ -22,6 +22,11 @@ MOST_WAITING: Final = 16
 FIRST_NOTES: Final = 50
 """Maximum number of earlier log entries that a new subscription receives."""
 
+_OF_SIGNALS: Final = ("signal", "transforms")
+"""Kinds of sources whose messages are made of the readings of one signal."""
+_QUEUED: Final = (*_OF_SIGNALS, "place")
+"""Kinds of sources whose messages wait in a queue."""
+
 
 class RobotFeed:
     """The subscriptions of one client to one robot."""
@@ -66,7 +71,7 @@ class RobotFeed:
             signal: the signal's declaration; None unless the source is a signal.
         """
         self._ids[source] = subscription
-        if source.kind in ("signal", "place"):
+        if source.kind in _QUEUED:
             is_large = signal is not None and signal.type in BINARY_TYPES
             self._waiting[source] = deque(maxlen=1 if is_large else MOST_WAITING)
         if self._hub is not None:
@@ -140,7 +145,7 @@ class RobotFeed:
         places: dict[TopicSource, None] = {}
         for sample in samples:
             for source in self._sources.get(sample.signal, ()):
-                if source.kind == "signal":
+                if source.kind in _OF_SIGNALS:
                     self._push(source, sample)
                 else:
                     places[source] = None
@@ -179,7 +184,7 @@ class RobotFeed:
                 self._mark(source)
 
     def _begin(self, source: TopicSource, hub: Hub) -> None:
-        if source.kind == "signal":
+        if source.kind in _OF_SIGNALS:
             newest = hub.latest(source.name)
             if newest is not None:
                 self._push(source, newest)
@@ -202,11 +207,13 @@ class RobotFeed:
         hub, messages = self._hub, self._messages
         if hub is None or messages is None:
             return None
-        if source.kind in ("signal", "place"):
+        if source.kind in _QUEUED:
             waiting = self._waiting[source]
             item = waiting.popleft()
             if waiting:
                 self._ready[source] = None
+            if isinstance(item, Sample) and source.kind == "transforms":
+                return messages.of_tree(item)
             return messages.of_sample(item) if isinstance(item, Sample) else item
         if source.kind == "log":
             return self._take_note(hub, messages)

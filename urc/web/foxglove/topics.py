@@ -21,6 +21,7 @@ from urc.runtime.json_messages import (
     signal_schema,
 )
 from urc.runtime.place_messages import place_sources
+from urc.runtime.transform_messages import TRANSFORMS_SCHEMA, transforms_message
 
 __all__ = ["LOG_SOURCE", "HubMessages", "TopicMessage", "RobotTopic", "TopicSource", "robot_topics"]
 
@@ -30,9 +31,9 @@ _LAST_NS = 2**63 - 1
 class TopicSource(NamedTuple):
     """The origin of a topic's messages in a robot's hub."""
 
-    kind: Literal["signal", "place", "log", "link"]
+    kind: Literal["signal", "place", "transforms", "log", "link"]
     name: str = ""
-    """Name of the signal, slot or transport."""
+    """Name of the signal, slot or transport; for transforms, the name of the tree's signal."""
 
 
 LOG_SOURCE = TopicSource("log")
@@ -68,6 +69,10 @@ def robot_topics(robot: str, profile: Profile) -> tuple[RobotTopic, ...]:
         found.append(
             _topic(f"/{robot}/urc/widget/{one.slot}", TopicSource("place", one.slot), one.shape)
         )
+    for signal in driver.signals.values():
+        if signal.type == "transform_tree":  # a driver has at most one
+            source = TopicSource("transforms", signal.name)
+            found.append(_topic(f"/{robot}/urc/transforms", source, TRANSFORMS_SCHEMA))
     found.append(_topic(f"/{robot}/urc/log", LOG_SOURCE, LOG_SCHEMA))
     for name in driver.transports:
         found.append(_topic(f"/{robot}/urc/link/{name}", TopicSource("link", name), LINK_SCHEMA))
@@ -92,7 +97,10 @@ class HubMessages:
         self._signals = profile.driver.signals
         self._places = {one.slot: one for one in place_sources(robot, profile)}
         self._utc_ns = utc_ns
+        self._prefix = f"{robot}/"
+        """Text before the names of coordinate frames, as in the messages of widgets."""
         self._newest: dict[str, tuple[Sample, TopicMessage]] = {}
+        self._newest_trees: dict[str, tuple[Sample, TopicMessage | None]] = {}
         self._newest_places: dict[str, tuple[int, TopicMessage | None]] = {}
         """Hub revision and newest message of each slot."""
 
@@ -118,9 +126,20 @@ class HubMessages:
         if known is not None and known[0] is sample:
             return known[1]
         time_ns = self._time(sample.time_s)
-        data = sample_message(self._signals[sample.signal], sample, time_ns)
+        data = sample_message(self._signals[sample.signal], sample, time_ns, self._prefix)
         message = TopicMessage(time_ns, data)
         self._newest[sample.signal] = sample, message
+        return message
+
+    def of_tree(self, sample: Sample) -> TopicMessage | None:
+        """Return the message with the transforms of a tree; None for a tree without transforms."""
+        known = self._newest_trees.get(sample.signal)
+        if known is not None and known[0] is sample:
+            return known[1]
+        time_ns = self._time(sample.time_s)
+        data = transforms_message(sample.value, time_ns, self._prefix)
+        message = None if data is None else TopicMessage(time_ns, data)
+        self._newest_trees[sample.signal] = sample, message
         return message
 
     def of_note(self, note: LogEntry) -> TopicMessage:

@@ -5,7 +5,7 @@ and ``if``. All other logic is in this module, and `urc.web.show.cells` builds a
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import cast
@@ -47,9 +47,13 @@ __all__ = [
     "RobotPageRequest",
     "ServerParts",
     "error_page",
+    "first_names",
     "render",
     "robot_page",
 ]
+
+_MOST_HANDLE_CHARS = 22
+"""Maximum length of several names on the drawer's handle, which is between widgets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +79,8 @@ class Drawer:
     """Indexes of their cells; empty if there is no drawer."""
     title: str
     """Title of the only widget, or a common title."""
+    names: str
+    """Titles of the first widgets, as many as the drawer's handle has room for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,8 +257,20 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
 
 
 def _drawer(slots: tuple[str, ...], drawer: frozenset[str], titles: Mapping[str, str]) -> Drawer:
-    title = titles[min(drawer)] if len(drawer) == 1 else words.t("More controls")
-    return Drawer(frozenset(map(slots.index, drawer)), title)
+    inside = [titles[name] for name in slots if name in drawer]
+    title = inside[0] if len(inside) == 1 else words.t("More controls")
+    return Drawer(frozenset(map(slots.index, drawer)), title, first_names(inside))
+
+
+def first_names(names: Sequence[str]) -> str:
+    """Return the first names of a list, with an ellipsis for the others; "" for an empty list."""
+    fitting = list(names[:1])
+    for name in names[1:]:
+        if len(", ".join([*fitting, name])) > _MOST_HANDLE_CHARS:
+            break
+        fitting.append(name)
+    more = " …" if len(fitting) < len(names) else ""
+    return ", ".join(fitting) + more
 
 
 def _footprints(profile: Profile, uses: Mapping[str, WidgetUse]) -> dict[str, Footprint]:

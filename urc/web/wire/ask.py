@@ -6,9 +6,11 @@ Layer 5. `urc.web.wire.messages` documents the direction of each message.
 from typing import Literal
 
 from urc.runtime.hub import SequenceProgress
+from urc.runtime.running_goals import RunningGoal
 from urc.web.wire.text import cut, encoded, milliseconds
 from urc.wire.client_messages import Approval, ApprovalRequest, Arguments, SequenceAction
 from urc.wire.server_messages import (
+    GoalRow,
     ProgressMessage,
     QuestionEndMessage,
     QuestionMessage,
@@ -53,7 +55,12 @@ def encode_token(run: int, token: str) -> str:
     return encoded(TokenMessage(run, token))
 
 
-def encode_progress(all_progress: tuple[SequenceProgress, ...], moving: list[str]) -> str:
+def encode_progress(
+    all_progress: tuple[SequenceProgress, ...],
+    moving: list[str],
+    goals: tuple[RunningGoal, ...],
+    now_s: float,
+) -> str:
     """Return the message with the states of all sequences and the commands that move the robot."""
     return encoded(
         ProgressMessage(
@@ -62,5 +69,17 @@ def encode_progress(all_progress: tuple[SequenceProgress, ...], moving: list[str
                 for one in all_progress
             ],
             moving,
+            [
+                GoalRow(
+                    one.number,
+                    one.command,
+                    dict(one.places),
+                    cut(one.by),
+                    one.page,
+                    milliseconds(now_s - one.since_s),
+                    one.is_lost,
+                )
+                for one in goals
+            ],
         )
     )

@@ -7,7 +7,9 @@ repeats the comparison with 10 000 messages of each type.
 import random
 from typing import Any
 
+import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from bench.rig.ros_messages import ROS1, ROS2, TYPES, RandomMessages, plain
 from urc.protocol.ros.common_types import common_types
@@ -106,6 +108,34 @@ def test_the_known_types_have_the_fields_of_rosbags(store: Any, is_ros1: bool) -
         expected = layout_of(full, parse_msg(full, text), is_ros1=is_ros1)
         found = layout_of(full, common_types(is_ros1=is_ros1), is_ros1=is_ros1)
         assert _shape(found) == _shape(expected), plain_name(name)
+
+
+def test_a_joint_jog_is_written_as_rosbags_writes_it() -> None:
+    """The fields are those of control_msgs/msg/JointJog.msg; rosbags knows no control_msgs."""
+    name = "control_msgs/msg/JointJog"
+    fields = "std_msgs/Header header\nstring[] joint_names\nfloat64[] displacements\n"
+    fields += "float64[] velocities\nfloat64 duration\n"
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg(fields, name))
+    header = store.types["std_msgs/msg/Header"](
+        stamp=store.types["builtin_interfaces/msg/Time"](sec=12, nanosec=34), frame_id="base_link"
+    )
+    message = store.types[name](
+        header=header,
+        joint_names=["elbow_joint", "wrist_1_joint"],
+        displacements=np.array([]),
+        velocities=np.array([0.1, -0.2]),
+        duration=0.0,
+    )
+    given = {
+        "header": {"stamp": {"sec": 12, "nanosec": 34}, "frame_id": "base_link"},
+        "joint_names": ["elbow_joint", "wrist_1_joint"],
+        "displacements": [],
+        "velocities": [0.1, -0.2],
+        "duration": 0,
+    }
+    writer = Writer(layout_of(name, common_types()))
+    assert writer.write(given).data == bytes(store.serialize_cdr(message, name))
 
 
 def _shape(layout: Any) -> Any:

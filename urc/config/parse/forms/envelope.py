@@ -5,14 +5,14 @@ the other forms.
 """
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Any, Final
 
 from urc.config.node import Node, Problems
 from urc.config.parse.form import FormContext, body_form
 from urc.config.parse.forms.json_text import compiled_tree, placed_templates, templates_in
 from urc.config.parse.forms.stamped import stamped_body, stamped_type
 from urc.config.parse.headers import check_headers
-from urc.expressions import Template
+from urc.expressions import Template, compile_template
 from urc.model.payload import WriteSpec
 
 __all__ = ["parse_write", "templates"]
@@ -29,7 +29,7 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
     attributes = {
         name: compiled_tree(inner, problems)
         for name, inner in part.entries().items()
-        if body is None or inner.path != body[0].path
+        if name != "stamped" and (body is None or inner.path != body[0].path)
     }
     if (body and spec is None) or len(problems.problems) > before:
         return None
@@ -46,12 +46,10 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
         problems.error(part.must("url"), "wrong-form", text, hint=hint)
         return None
     stamped = part.get("stamped") if part.name == "publish" else None
-    if stamped is not None and attributes.pop("stamped"):
-        kind = stamped_type(part, attributes.get("type"), problems)
-        if kind is None or spec is None:
+    if stamped is not None and stamped.data:
+        spec = _stamped(part, attributes, spec, problems)
+        if spec is None:
             return None
-        attributes["type"] = kind
-        spec = spec._replace(options={"tree": stamped_body(kind, spec.options["tree"])})
     if part.name == "request":
         attributes.setdefault("method", "GET" if spec is None else "POST")
     found = list(templates_in(attributes))
@@ -65,10 +63,42 @@ def parse_write(part: Node, problems: Problems, context: FormContext) -> WriteSp
     )
 
 
+def _stamped(
+    part: Node, attributes: dict[str, Any], spec: WriteSpec | None, problems: Problems
+) -> WriteSpec | None:
+    """Return the body of a stamped message, and set its type in `attributes`; None after a problem.
+
+    If `stamped` is an expression, the type is a template, and the writer chooses the body: it knows
+    the settings.
+    """
+    plain = attributes.get("type")
+    kind = stamped_type(part, plain, problems)
+    if kind is None or spec is None:
+        return None
+    body = stamped_body(kind, spec.options["tree"])
+    inner = part.must("stamped")
+    if not isinstance(inner.data, str):
+        attributes["type"] = kind
+        return spec._replace(options={"tree": body})
+    chosen = problems.expression(inner)
+    if chosen is None:
+        return None
+    if not chosen.names <= {"settings"}:
+        others = ", ".join(sorted(chosen.names - {"settings"}))
+        text = f"'stamped' can use only settings, found {others}"
+        problems.error(inner, "unknown-name", text, hint="write settings.NAME, true or false")
+        return None
+    attributes["type"] = compile_template(
+        f"{{{{ '{kind}' if ({inner.data}) else '{plain}' }}}}",
+    )
+    options = {**spec.options, "stamped": body, "is_stamped": chosen}
+    return spec._replace(options=options, settings=spec.settings | chosen.settings)
+
+
 def _unstamped(part: Node, spec: WriteSpec) -> WriteSpec:
     """Return the declaration of the body as written, without the conversion to the stamped type."""
     tree = spec.options.get("tree")
-    if not part.data.get("stamped") or not isinstance(tree, dict):
+    if part.data.get("stamped") is not True or not isinstance(tree, dict):
         return spec
     return spec._replace(options={"tree": next(reversed(tree.values()))})
 

@@ -13,7 +13,7 @@ import { reason } from "../core/api_client.js";
 import { t } from "../core/words.js";
 import { AlarmActions } from "./actions.js";
 import { AlarmBook, levelOf } from "./book.js";
-import { lineOf, stateWords, titleOf } from "./phrases.js";
+import { lineOf, moreAlarms, stateWords, titleOf } from "./phrases.js";
 import { AlarmSheet } from "./sheet.js";
 import { ALWAYS, AlarmSound } from "./sound.js";
 import { AlarmStrip } from "./strip.js";
@@ -98,7 +98,7 @@ export class PageAlarms {
     this.saidMs = performance.now();
     const first = rows[0];
     const line = first ? lineOf(first, this.store, performance.now()) : "";
-    const more = rows.length > 1 ? t("+{count} more", { count: rows.length - 1 }) : "";
+    const more = moreAlarms(rows.length - 1);
     this.said.textContent = [line, first?.action, more].filter(Boolean).join(". ");
   }
 

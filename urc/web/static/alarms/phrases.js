@@ -12,6 +12,16 @@ import { levelOf } from "./book.js";
 
 /** Shape of each priority, because colour alone is not enough. */
 export const SIGNS = Object.freeze({ high: "▲", medium: "◆", low: "■" });
+/**
+ * Return the number of alarms that are not shown, as text; "" without any.
+ *
+ * @param {number} count
+ */
+export function moreAlarms(count) {
+  if (count < 1) return "";
+  return count === 1 ? t("1 more alarm") : t("{count} more alarms", { count });
+}
+
 /** @type {Readonly<Record<string, string>>} */
 export const STATES = Object.freeze({
   unacknowledged: mark("not acknowledged"),

@@ -10,7 +10,7 @@
 import { made } from "../core/dom.js";
 import { t } from "../core/words.js";
 import { attribute, write } from "../widgets/kit.js";
-import { lineOf, SIGNS } from "./phrases.js";
+import { lineOf, moreAlarms, SIGNS } from "./phrases.js";
 
 export class AlarmStrip {
   /**
@@ -66,8 +66,7 @@ export class AlarmStrip {
     const line = lineOf(first, store, nowMs, false); // an age would change the height of the strip
     write(this.line, first.active ? line : t("{alarm}: back to normal", { alarm: line }));
     write(this.action, first.active ? first.action : "");
-    write(this.more, listed.length > 1 ? `+${listed.length - 1}` : "");
-    attribute(this.more, "aria-label", listed.length > 1 ? t("+{count} more", { count: listed.length - 1 }) : null);
+    write(this.more, moreAlarms(listed.length - 1));
     this.seen.hidden = !mayAct || first.state === "acknowledged";
   }
 }

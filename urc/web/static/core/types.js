@@ -283,8 +283,9 @@
  * @property {(module: string) => Promise<void>} style Loads the style sheet of a third-party module.
  *
  * @typedef {object} Topics Data of the topics for `follow`.
- * @property {{isUp: boolean, links: readonly Link[], isReplay?: boolean}} links The robot's transports;
- *   empty while the page has no connection to URC. A playback shows their state in the recording.
+ * @property {{isUp: boolean, isRefused?: boolean, links: readonly Link[], isReplay?: boolean}} links The
+ *   robot's transports; empty while the page has no connection to URC, or URC cannot open the robot
+ *   (isRefused). A playback shows their state in the recording.
  * @property {{lines: readonly LogLine[], missing: number}} log The newest lines, oldest first, and
  *   the number of lines lost on their way to this page.
  * @property {{lease: Lease | null, isMine: boolean, refusal: string}} lease The lease.
@@ -297,7 +298,29 @@
  *   since the opening of the page.
  * @property {Readonly<Record<string, Progress>>} sequences State of each sequence by its name, without
  *   sequences that never ran.
+ * @property {{isKnown: boolean, goals: readonly Goal[]}} goals Autonomous motion by the commands of
+ *   the widget's outputs, sent from any page and not ended, oldest first. Not known until the server
+ *   has told of goals in the robot's session. For widgets in the page.
  * @property {{name: string}} theme Changes whenever the colours change.
+ *
+ * @typedef {object} Goal Autonomous motion that has not ended.
+ * @property {number} number
+ * @property {string} output Output to whose command it belongs.
+ * @property {Readonly<Record<string, number | readonly number[]>>} args Arguments that are numbers or
+ *   lists of numbers, by the names of the widget's manifest.
+ * @property {string} by Name of the operator who has sent it.
+ * @property {boolean} isOurs Whether this page has sent it, since it was opened.
+ * @property {number} since Time of its start, in seconds on the page's own clock.
+ * @property {boolean} isLost Whether its outcome is unknown, so the robot may go on.
+ *
+ * @typedef {object} SentGoal A goal from the server, for all widgets.
+ * @property {number} number
+ * @property {string} command
+ * @property {Readonly<Record<string, number | readonly number[]>>} places Its arguments with numbers.
+ * @property {string} by
+ * @property {boolean} isOurs
+ * @property {number} since
+ * @property {boolean} isLost
  *
  * @typedef {object} LogLine
  * @property {number} number Number of the line in its session.

@@ -260,8 +260,8 @@ export function tellable(what, news, { signals, commands }) {
   switch (what) {
     case "links": {
       /** @type {Topics["links"]} */
-      const { isUp, links, isReplay = false } = news;
-      return { isUp, isReplay, links: links.map((link) => ({ ...link, address: "", detail: "" })) };
+      const { isUp, links, isRefused = false, isReplay = false } = news;
+      return { isUp, isRefused, isReplay, links: links.map((link) => ({ ...link, address: "", detail: "" })) };
     }
     case "alarms":
       return /** @type {Topics["alarms"]} */ (news).filter(({ signal }) => signals.has(signal));

@@ -1,7 +1,7 @@
 // @ts-check
 /**
  * The captions and buttons of the background, and the handle of the drawer (elements with
- * `data-floats`), moved so that no widget, STOP button or other float covers them.
+ * `data-floats`), moved so that no widget, STOP button, alarm or other float covers them.
  *
  * @typedef {{ left: number, top: number, right: number, bottom: number }} Box
  */
@@ -10,6 +10,9 @@ const GAP = 6;
 /** Minimum time between two placements, in ms; the text of a caption changes often. */
 const SOONEST_MS = 200;
 const DOCK = ".urc-stop-button, .urc-who, .urc-verbs > *";
+const STRIP = ".urc-alarm-strip";
+/** Parts of the background that its captions must not cover, for example a question. */
+const TAKEN = "[data-taken]";
 
 /**
  * Keep the floats of a stage free until `signal` ends.
@@ -33,6 +36,8 @@ export function keepFloatsFree(stage, signal) {
   const changes = new MutationObserver(later);
   sizes.observe(stage);
   changes.observe(stage, { subtree: true, attributeFilter: ["data-place", "data-page", "data-state", "hidden"] });
+  const strip = document.querySelector(STRIP);
+  if (strip) sizes.observe(strip); // without a size while it is hidden
   later();
   signal.addEventListener("abort", () => {
     clearTimeout(timer);
@@ -58,7 +63,7 @@ function placeFloats(stage) {
   for (const el of floats) el.style.transform = "";
   // On a phone in portrait, the widgets are below the background.
   if (!matchMedia("(width >= 37.5rem)").matches) return;
-  const cells = [...stage.querySelectorAll('.urc-cell:not([data-place="ground"])'), ...document.querySelectorAll(DOCK)];
+  const cells = [...stage.querySelectorAll('.urc-cell:not([data-place="ground"])'), ...document.querySelectorAll(`${DOCK}, ${STRIP}, ${TAKEN}`)];
   /** @type {Box[]} */
   const taken = cells.filter((el) => isShown(el) && !isInDrawer(el)).map((el) => el.getBoundingClientRect());
   const room = stage.getBoundingClientRect();

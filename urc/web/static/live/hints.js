@@ -1,12 +1,14 @@
 // @ts-check
 /**
- * Hints about driving, stopping and swapping views, for the first visit with a touch screen. They
- * are shown once per device, below the bar, without covering anything. A tap on their button ends
- * them.
+ * Hints about driving, stopping, turning the phone and swapping views, for the first visit with a
+ * touch screen. They are shown once per device, below the bar, without covering anything. A tap on
+ * their button ends them.
  */
 import { t } from "../core/words.js";
 
 const KEY = "urc-hints";
+/** A phone in portrait. */
+const UPRIGHT = "(width < 37.5rem) and (orientation: portrait)";
 
 /**
  * Show the hints if this device has a touch screen and has not shown them yet.
@@ -20,6 +22,7 @@ export function offerHints(root) {
     root.querySelector('[data-footprint="stick"]') ? t("Hold a stick to drive. Let go to stop.") : "",
     root.querySelector("[data-stop-button]") ? t("STOP works at any time, even without control.") : "",
     root.querySelector(".urc-pip") ? t("Tap a small view to swap it with the large one.") : "",
+    root.querySelector("[data-turned]") && matchMedia(UPRIGHT).matches ? t("Turn the phone for the full layout.") : "",
     t("Tap the connection symbol to see the connection's state and the log."),
   ].filter(Boolean);
   const card = document.createElement("section");

@@ -57,6 +57,9 @@ let session = "";
 
 const address = new URL(root.dataset["socket"] ?? "/ws", location.href);
 address.protocol = address.protocol === "https:" ? "wss:" : "ws:";
+const UNKNOWN_GOALS = { look: "", value: { isKnown: false, goals: [] } };
+/** Autonomous motion of all pages; each widget gets that of its own outputs. @type {{look: string, value: any}} */
+let goals = UNKNOWN_GOALS;
 const socket = new Socket(address.href, {
   message: take,
   picture: takePicture,
@@ -65,6 +68,7 @@ const socket = new Socket(address.href, {
     store.setUp(isUp, performance.now());
     if (!isUp) {
       giveUpCommands();
+      goals = UNKNOWN_GOALS; // until the server tells of them again
       drive.lost();
       asks.lost();
       input.spendAll(t("the connection to URC was lost"));
@@ -89,7 +93,8 @@ const themes = new Themes(wake);
 const follows = new PageTopics(
   {
     links: () => {
-      const value = { isUp: store.isUp, links: [...store.links.values()], isReplay: badge.isReplay };
+      const isRefused = socket.refusal !== "";
+      const value = { isUp: store.isUp, isRefused, links: [...store.links.values()], isReplay: badge.isReplay };
       return { look: JSON.stringify(value), value };
     },
     log: () => log.news(),
@@ -105,6 +110,7 @@ const follows = new PageTopics(
       return { look: JSON.stringify(value), value };
     },
     sequences: () => ({ look: JSON.stringify(sequences), value: sequences }),
+    goals: () => goals,
     theme: () => themes.news(),
   },
   wake,
@@ -187,7 +193,7 @@ function draw() {
   follows.frame();
   askPictures();
   badge.frame(store, socket);
-  panel.frame(store, socket.reason);
+  panel.frame(store, socket.reason, socket.refusal !== "");
   lost.frame(store, socket, nowMs, badge.isReplay);
   alarms.frame(nowMs);
   stop.frame();
@@ -260,6 +266,7 @@ function take(message) {
     case "progress":
       sequences = Object.fromEntries(message.sequences.map((/** @type {import("../core/types.js").Progress} */ one) => [one.command, one]));
       stop.moving = message.moving;
+      goals = sentGoals(message.goals, nowMs);
       break;
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
@@ -300,6 +307,23 @@ function take(message) {
       break;
   }
   wake();
+}
+
+/**
+ * @param {any[]} rows
+ * @param {number} nowMs
+ */
+function sentGoals(rows, nowMs) {
+  const value = rows.map(({ number, command, places, by, page, since, lost = false }) => ({
+    number,
+    command,
+    places,
+    by,
+    isOurs: page === drive.lease?.you,
+    since: (nowMs - since) / 1000,
+    isLost: lost,
+  }));
+  return { look: JSON.stringify(rows.map(({ number, lost }) => [number, lost])), value: { isKnown: true, goals: value } };
 }
 
 /**

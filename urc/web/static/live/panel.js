@@ -45,10 +45,11 @@ export class Panel {
   /**
    * @param {Store} store
    * @param {string} reason the server's reason for the missing connection
+   * @param {boolean} isRefused whether the server is reachable, but cannot open the robot
    */
-  frame(store, reason) {
+  frame(store, reason, isRefused) {
     const links = [...store.links.values()];
-    const trying = t("No connection to URC; trying again.");
+    const trying = isRefused ? t("Cannot open the robot; trying again.") : t("No connection to URC; trying again.");
     const last = reason ? t("Last message: {reason}", { reason: said(reason) }) : "";
     const lost = `${trying} ${last}`.trim();
     const key = store.isUp ? JSON.stringify(links) : lost;

@@ -38,8 +38,13 @@ const root = part(document, "[data-settings]");
 const form = /** @type {HTMLFormElement} */ (part(root, "[data-form]"));
 const said = part(root, "[data-said]");
 const found = part(root, "[data-found]");
+const tester = form.querySelector("[data-test]");
+const plain = form.querySelector("[data-plain]");
 /** Secrets to delete. @type {Set<string>} */
 const forgotten = new Set();
+/** Saved values since the page was loaded. @type {Map<Element, string>} */
+const kept = new Map();
+let isBusy = false;
 
 /** @returns {Record<string, string | null>} */
 function filled() {
@@ -60,10 +65,40 @@ function chosen(name) {
   return field instanceof HTMLSelectElement ? field.value : "";
 }
 
-/** @param {boolean} isBusy */
-function lock(isBusy) {
+/** @returns {Map<Element, string>} */
+function values() {
+  const fields = [...form.elements].filter((one) => one instanceof HTMLInputElement || one instanceof HTMLSelectElement);
+  return new Map(fields.map((field) => [field, field.value]));
+}
+
+/** Return the value of a field when the page was loaded. @param {Element} field */
+function firstOf(field) {
+  if (field instanceof HTMLInputElement) return field.defaultValue;
+  const options = field instanceof HTMLSelectElement ? [...field.options] : [];
+  return (options.find((one) => one.defaultSelected) ?? options[0])?.value ?? "";
+}
+
+function isChanged() {
+  return forgotten.size > 0 || [...values()].some(([field, value]) => value !== (kept.get(field) ?? firstOf(field)));
+}
+
+/** Offer to save only what has changed; a test is possible at any time. */
+function offer() {
+  const hasChange = isChanged();
+  if (plain instanceof HTMLButtonElement) plain.disabled = isBusy || !hasChange;
+  if (!(tester instanceof HTMLButtonElement)) return;
+  tester.disabled = isBusy;
+  tester.textContent = hasChange ? t("Test & save") : t("Test connection");
+  tester.classList.toggle("urc-button-main", hasChange);
+  form.querySelector("[data-open]")?.classList.toggle("urc-button-main", !hasChange);
+}
+
+/** @param {boolean} isLocked */
+function lock(isLocked) {
+  isBusy = isLocked;
   for (const one of form.querySelectorAll("button")) one.disabled = isBusy;
   form.toggleAttribute("aria-busy", isBusy);
+  offer();
 }
 
 /** @param {{test: boolean, anyway?: boolean}} how */
@@ -72,6 +107,7 @@ async function send({ test, anyway = false }) {
   tell(test ? t("testing the connection …") : t("saving …"));
   mistakes({});
   lines([]);
+  const [sent, hasChange] = [values(), isChanged()];
   try {
     /** @type {Answer} */
     const answer = await ask(root.dataset["post"] ?? "", {
@@ -85,8 +121,9 @@ async function send({ test, anyway = false }) {
     mistakes(answer.faults);
     lines(answer.lines);
     showResults(answer.lines);
-    tell(`${answer.isSaved ? "✓" : "▲"} ${answer.text}`, answer.isSaved ? "" : "urc-bad");
-    if (answer.isSaved) saved();
+    const isTest = test && !hasChange && answer.isSaved;
+    tell(`${answer.isSaved ? "✓" : "▲"} ${isTest ? t("Tested. The settings are unchanged.") : answer.text}`, answer.isSaved ? "" : "urc-bad");
+    if (answer.isSaved) saved(sent);
     else if (answer.lines.length) offerAnyway();
   } catch (error) {
     tell(`▲ ${reason(error)}`, "urc-bad");
@@ -110,8 +147,10 @@ function offerAnyway() {
   rows.after(more);
 }
 
-function saved() {
+/** @param {Map<Element, string>} sent values of the fields; a field may have changed since */
+function saved(sent) {
   forgotten.clear();
+  for (const [field, value] of sent) kept.set(field, value);
   // The interface chosen here becomes the device's choice.
   const path = root.dataset["robot"] ?? "/";
   const name = encodeURIComponent(chosen("interface"));
@@ -120,6 +159,7 @@ function saved() {
     if (!(field instanceof HTMLInputElement)) continue;
     if (field.value) field.placeholder = "••••••";
     field.value = "";
+    kept.set(field, "");
   }
 }
 
@@ -141,21 +181,20 @@ function mistakes(faults) {
 }
 
 /**
- * Show the result of a test at the field that it concerns, the failures first.
+ * Show the results of a test at the fields that they concern; at each field, the failures first.
  *
  * @param {Line[]} some
  */
 function showResults(some) {
   const order = ["fails", "opens", "answers"];
-  const sorted = [...some].sort((one, other) => order.indexOf(one.verdict) - order.indexOf(other.verdict));
-  for (const line of sorted) {
-    const { field: name, verdict } = line;
-    const box = [...form.querySelectorAll("[data-field]")].find(
-      (one) => one instanceof HTMLElement && name !== "" && one.dataset["field"] === name,
-    );
-    const told = box?.querySelector("[data-fault]");
-    if (!box || !(told instanceof HTMLElement) || !told.hidden) continue;
-    told.textContent = resultOf(line, some.length > 1);
+  const sorted = some.toSorted((one, other) => order.indexOf(one.verdict) - order.indexOf(other.verdict));
+  for (const box of form.querySelectorAll("[data-field]")) {
+    const name = box instanceof HTMLElement ? box.dataset["field"] : "";
+    const here = sorted.filter(({ field }) => field !== "" && field === name);
+    const told = box.querySelector("[data-fault]");
+    const verdict = here[0]?.verdict; // the worst
+    if (!verdict || !(told instanceof HTMLElement) || !told.hidden) continue;
+    told.replaceChildren(...here.map((one) => made("span", { class: "urc-result" }, resultOf(one, some.length > 1))));
     told.dataset["tone"] = { answers: "good", opens: "caution" }[String(verdict)] ?? "";
     told.dataset["tested"] = "";
     told.hidden = false;
@@ -170,9 +209,10 @@ function showResults(some) {
  */
 function resultOf({ verdict, transport, cause, address, text }, isNamed) {
   const [sign, word] = VERDICTS[verdict] ?? ["", verdict];
-  if (verdict === "answers") return `${sign} ${isNamed ? `${transport}: ` : ""}${t(word)}`;
+  const name = isNamed ? `${transport}: ` : "";
+  if (verdict === "answers") return `${sign} ${name}${t(word)}`;
   const words = causeWords(cause, address, text);
-  return `${sign} ${words.cause} ${words.step}`;
+  return `${sign} ${name}${words.cause} ${words.step}`;
 }
 
 /** Remove the result of a test from a changed field. @param {Event} event */
@@ -214,7 +254,8 @@ form.addEventListener("submit", (event) => {
   void send({ test: true });
 });
 form.addEventListener("input", outdate);
-form.querySelector("[data-plain]")?.addEventListener("click", () => void send({ test: false }));
+form.addEventListener("input", offer);
+plain?.addEventListener("click", () => void send({ test: false }));
 for (const one of form.querySelectorAll("[data-forget]")) {
   one.addEventListener("click", () => {
     if (!(one instanceof HTMLElement)) return;
@@ -225,7 +266,9 @@ for (const one of form.querySelectorAll("[data-forget]")) {
       field.value = "";
       field.placeholder = "";
     }
+    offer();
     tell(t("To be deleted when you save"));
   });
 }
 ready(root);
+offer();

@@ -15,7 +15,7 @@
 import { questionsOf } from "../control/confirm_dialog.js";
 import { t } from "./kit.js";
 import { memoryOf } from "./tab_storage.js";
-import { argumentsOf, describe } from "./output.js";
+import { argumentsOf, describe, goalsOf } from "./output.js";
 import { Decoder } from "./image_decoder.js";
 import { loadStyle } from "./style.js";
 
@@ -56,7 +56,9 @@ export function contextOf(cell) {
       doors.stop.follow(cell.guarded(listener), end.signal);
     },
     follow: (/** @type {keyof Topics} */ what, /** @type {(news: any) => void} */ listener) => {
-      doors.follows.listen(what, cell.guarded(listener), end.signal);
+      const tell = cell.guarded(listener);
+      const own = what === "goals" ? (/** @type {any} */ news) => tell({ ...news, goals: goalsOf(cell.outputs, news.goals) }) : tell;
+      doors.follows.listen(what, own, end.signal);
     },
     alarms: Object.freeze({
       may: () => doors.alarms.mayAct,

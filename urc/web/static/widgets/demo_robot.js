@@ -203,6 +203,7 @@ export class DemoRobot {
       watched: { limited: 0, known: 0 },
       latency: { isUp: true, tripMs: 12, failures: 0, skewMs: 0, messages: 0, bytes: 0 },
       sequences: {},
+      goals: { isKnown: true, goals: [] },
       theme: { name: "" },
     };
     /** @type {any} */

@@ -87,3 +87,22 @@ function scale(value, range) {
   const scaled = range.rest + Math.abs(share) * (end - range.rest);
   return range.isWhole ? Math.round(scaled) : Math.round(scaled * 1e6) / 1e6;
 }
+
+/**
+ * Return the goals whose command is bound to an output, with the names of the outputs' arguments.
+ *
+ * @param {Iterable<[string, Output]>} outputs
+ * @param {readonly import("../core/types.js").SentGoal[]} goals
+ * @returns {import("../core/types.js").Goal[]}
+ */
+export function goalsOf(outputs, goals) {
+  const bound = [...outputs];
+  return goals.flatMap(({ command, places, ...goal }) => {
+    const found = bound.find(([, output]) => output.command === command);
+    if (!found) return [];
+    const [output, { names, fixed }] = found;
+    const given = Object.entries(places).filter(([name]) => !Object.hasOwn(fixed, name));
+    const args = Object.fromEntries(given.map(([name, value]) => [Object.hasOwn(names, name) ? names[name] : name, value]));
+    return [{ ...goal, output, args }];
+  });
+}

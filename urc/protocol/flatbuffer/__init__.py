@@ -1,0 +1,1 @@
+"""Messages in FlatBuffers, read by their own schemas."""

@@ -1,0 +1,1 @@
+"""Messages in the Protocol Buffers format, read and written by their own schemas."""
