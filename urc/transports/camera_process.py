@@ -38,8 +38,11 @@ MEMORY_BYTES: Final = 2**31
 """Address space of this process; the libraries need 0.5 GB of it before they start."""
 NO_KEYFRAME_S: Final = 20.0
 PROBE_BYTES: Final = 500_000
-PROBE_US: Final = 1_000_000
+PROBE_US: Final = 500_000
 """Data and time for the detection of the stream's format."""
+_NETWORK_S: Final = 0.005
+"""Wait for a packet that shows that the library has no more packets in stock, in seconds."""
+_MOST_EARLY: Final = 200
 _CODECS: Final = {"h264": False, "hevc": True}
 """Whether the codec is H.265, keyed by the library's name."""
 
@@ -171,6 +174,42 @@ class UnitReader:
         self._info = found
 
 
+class EarlyUnits:
+    """The access units that the library has kept while it detected the format, with honest times.
+
+    The library delivers them all at once, so the time of delivery would make them too young. The
+    last one has just arrived. The time stamps of the stream tell how much older the others are.
+    """
+
+    def __init__(self, opened_s: float) -> None:
+        """Begin a stream whose first byte arrived at `opened_s` or later."""
+        self._opened_s = opened_s
+        self._units: list[tuple[VideoUnit, float | None]] = []
+        self.is_over = False
+
+    def add(self, unit: VideoUnit, pts_s: float | None) -> None:
+        """Add a unit with its time stamp in the stream, in seconds."""
+        self._units.append((unit, pts_s))
+
+    def ends(self, waited_s: float) -> bool:
+        """Return whether a wait for the next unit shows that it comes from the network."""
+        return waited_s > _NETWORK_S or len(self._units) >= _MOST_EARLY
+
+    def stamped(self) -> list[VideoUnit]:
+        """Return all units with their times of arrival, and end the early phase."""
+        self.is_over = True
+        if not self._units:
+            return []
+        count, (newest, last_pts) = len(self._units), self._units[-1]
+        end_s, found = newest.time_s, []
+        for place, (unit, pts_s) in enumerate(self._units):
+            spread_s = (end_s - self._opened_s) * (count - 1 - place) / count
+            older_s = spread_s if pts_s is None or last_pts is None else last_pts - pts_s
+            older_s = max(0.0, min(older_s, end_s - self._opened_s))
+            found.append(unit._replace(time_s=end_s - older_s))
+        return found
+
+
 def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
     """Read a stream until its end, and put its access units into a queue.
 
@@ -179,6 +218,7 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
     """
     import av  # the extra `video`: takes 150 ms
 
+    early = EarlyUnits(time.monotonic())
     try:
         with _opened(av, job, source) as container:
             found = container.streams.video
@@ -191,7 +231,7 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
                     f"the camera sends {name}; URC supports H.264 and H.265: select one of them in"
                     " the camera's settings"
                 )
-            _read_stream(av, container, stream, queue, is_hevc=_CODECS[name])
+            _read_stream(av, container, stream, queue, early, is_hevc=_CODECS[name])
     except av.error.FFmpegError as fault:
         raise DemuxFault(_words(av, fault)) from fault
     raise DemuxFault("the camera ended the stream")
@@ -218,21 +258,40 @@ def _opened(av: Any, job: DemuxJob, source: RawIOBase) -> Any:
     return av.open(source, format=job.format or None, options=options, buffer_size=4096)
 
 
-def _read_stream(av: Any, container: Any, stream: Any, queue: UnitQueue, *, is_hevc: bool) -> None:
+def _read_stream(
+    av: Any,
+    container: Any,
+    stream: Any,
+    queue: UnitQueue,
+    early: EarlyUnits,
+    *,
+    is_hevc: bool,
+) -> None:
     extra = stream.codec_context.extradata or b""
     reader = UnitReader(is_hevc=is_hevc, extra=_plain(extra), began_s=time.monotonic())
     convert = None
     if extra and not _has_start_code(extra):  # MP4: lengths instead of start codes
         name = "hevc_mp4toannexb" if is_hevc else "h264_mp4toannexb"
         convert = av.BitStreamFilterContext(name, stream)
+    asked_s = time.monotonic()
     for packet in container.demux(stream):
-        if not packet.size:
-            continue
+        came_s = time.monotonic()
+        has_data = packet.size > 0  # the filter empties the packet
+        if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
+            _put(early.stamped(), queue)
         packets: Iterable[Any] = [packet] if convert is None else convert.filter(packet)
-        for one in packets:
-            unit = reader.unit(bytes(one), time.monotonic())
-            if unit is not None:
-                queue.put(_record(UNIT, encode_unit(unit)), is_key=unit.is_key)
+        for one in packets if has_data else ():
+            unit = reader.unit(bytes(one), came_s)
+            if unit is not None and early.is_over:
+                _put([unit], queue)
+            elif unit is not None:
+                early.add(unit, None if one.pts is None else float(one.pts * one.time_base))
+        asked_s = time.monotonic()
+
+
+def _put(units: Iterable[VideoUnit], queue: UnitQueue) -> None:
+    for unit in units:
+        queue.put(_record(UNIT, encode_unit(unit)), is_key=unit.is_key)
 
 
 def _has_start_code(data: bytes) -> bool:

@@ -13,11 +13,12 @@ from urc.transports.camera_process import (
     NO_KEYFRAME_S,
     QUEUE_BYTES,
     DemuxFault,
+    EarlyUnits,
     UnitQueue,
     UnitReader,
 )
 from urc.transports.camera_relay import RtspWatch
-from urc.video import MAX_UNIT_BYTES
+from urc.video import MAX_UNIT_BYTES, VideoUnit
 
 KEY, DELTA = b"\0\0\1\x65image", b"\0\0\1\x41change"
 
@@ -136,6 +137,33 @@ def test_a_gigantic_access_unit_is_refused() -> None:
     reader = UnitReader(is_hevc=False, began_s=0.0)
     with pytest.raises(DemuxFault, match=r"^an encoded image has 4194305 bytes; the limit is"):
         reader.unit(bytes(MAX_UNIT_BYTES + 1), 0.0)
+
+
+def early(*stamps: float | None) -> list[float]:
+    """Return the times of units that the library delivers at once, 2 s after the first byte."""
+    units = EarlyUnits(100.0)
+    for place, pts_s in enumerate(stamps):
+        unit = VideoUnit("avc1.42", place == 0, 640, 480, 102.0, b"x")
+        units.add(unit, pts_s)
+    return [round(one.time_s, 3) for one in units.stamped()]
+
+
+def test_units_kept_during_the_detection_are_not_younger_than_they_are() -> None:
+    """By the time stamps of the stream, and never before its first byte."""
+    assert early(7.0, 7.5, 8.5) == [100.5, 101.0, 102.0]
+    assert early(7.0, 7.5, 77.0) == [100.0, 100.0, 102.0]
+    assert early(9.0, 7.5, 8.5) == [102.0, 101.0, 102.0]
+    assert early(None, None, None, None) == [100.5, 101.0, 101.5, 102.0]
+    assert early() == []
+
+
+def test_the_detection_ends_with_the_first_wait_for_the_network() -> None:
+    units = EarlyUnits(100.0)
+    assert not units.ends(0.001)
+    assert units.ends(0.02)
+    assert not units.is_over
+    units.stamped()
+    assert units.is_over
 
 
 # What the relay refuses
