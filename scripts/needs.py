@@ -8,7 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -33,6 +33,18 @@ LANGUAGE_SERVER = (
 )
 _SYSTEM_PATH = f"{os.environ.get('PATH', os.defpath)}{os.pathsep}/usr/sbin{os.pathsep}/sbin"
 """Search path with the folders of server programs; by default, only root's `PATH` has them."""
+
+
+def _rtsp_server() -> Iterator[str]:
+    """Yield the RTSP server's library if its encoder and its language binding are there too."""
+    parts = ("gstreamer-1.0/libgstx264.so", "girepository-1.0/GstRtspServer-1.0.typelib")
+    for folder in Path("/usr/lib").glob("*-linux-*"):
+        found = [folder / part for part in parts]
+        if (
+            all(one.is_file() for one in found)
+            and Path("/usr/lib/python3/dist-packages/gi").is_dir()
+        ):
+            yield os.fspath(found[-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +191,13 @@ NEEDS = (
         executables=("ffmpeg",),
         package="ffmpeg",
         purpose="tests of camera streams",
+    ),
+    Need(
+        name="rtsp-server",
+        executables=(),
+        package="gir1.2-gst-rtsp-server-1.0 gstreamer1.0-plugins-ugly python3-gi",
+        purpose="tests of cameras against GStreamer's RTSP server",
+        other=lambda: next(_rtsp_server(), None),
     ),
     Need(
         name="lighttpd",

@@ -103,6 +103,12 @@ FAMILIES: Mapping[str, Family] = {
         _driver("http httpAuth httpHeaders"),
         {"transports/http.md": "HTTP"},
     ),
+    "camera": Family(
+        "Keys of camera transports",
+        "Keys of a camera that sends H.264 or H.265.",
+        _driver("camera cameraAuth"),
+        {"transports/camera.md": "Cameras with H.264"},
+    ),
     "websocket": Family(
         "Keys of websocket transports",
         "Keys of a WebSocket to the robot.",

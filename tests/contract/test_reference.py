@@ -74,7 +74,7 @@ def test_every_property_of_every_definition_has_its_section() -> None:
 def is_transport(schema: keys.Schema) -> bool:
     """Return whether a definition has the keys of every transport, which are told once."""
     properties = schema.get("properties", {})
-    return {"type", "timeouts", "reconnect"} <= set(properties) and len(properties) > 18
+    return {"type", "timeouts", "reconnect"} <= set(properties) and len(properties) > 8
 
 
 @pytest.mark.parametrize("name", PAGES)

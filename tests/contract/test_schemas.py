@@ -303,6 +303,12 @@ def is_option_of_transport(path: tuple[str | int, ...], key: str) -> bool:
     return len(path) >= 2 and path[-2] == "transports" and key in ("host", "port")
 
 
+def common_keys() -> set[str]:
+    """Return the keys of every kind of transport."""
+    common = read_schema("driver.schema.json")["$defs"]["anyTransport"]["properties"]
+    return set(common)
+
+
 def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     """One parser serves places of which the schema allows some keys and not others.
 
@@ -315,6 +321,8 @@ def is_shared_reader(asked: tuple[str, tuple[str | int, ...], str]) -> bool:
     name, path, key = asked
     if path[-2:-1] == ("transports",):
         kind = value_at(read_document(name).data, path)["type"]
+        if kind == "camera" and key in common_keys():
+            return True  # nothing is sent to a camera, so it has no queue and no steps
         return kind not in TRANSPORTS or key in (
             "replies",
             "connection",

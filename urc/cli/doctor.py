@@ -41,6 +41,7 @@ EXTRAS = {
     "cbor2": ("cbor", "CBOR images from rosbridge"),
     "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
     "mcap": ("record", "recordings of sessions"),
+    "av": ("video", "cameras that send H.264 or H.265"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
 """Extra and purpose of each optional package, by package name."""

@@ -156,7 +156,7 @@ def _view(widget: Widget | None, name: str, signal: Signal) -> WidgetUse | None:
 
 
 def _candidates(signal: Signal) -> tuple[str, ...]:
-    if signal.type == "image":
+    if signal.type in ("image", "video"):
         return ("camera", "image")
     if signal.type == "transform_tree":
         return ("transforms",)

@@ -5,7 +5,7 @@
 
 from typing import Final, NamedTuple
 
-__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "MessageTransportRules"]
+__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "VIDEO_LINES", "MessageTransportRules"]
 
 
 class MessageTransportRules(NamedTuple):
@@ -25,6 +25,8 @@ MESSAGING: Final = {
     "zenoh": MessageTransportRules(("publish", "get"), ("liveliness",)),
     "http": MessageTransportRules(("request",), ("stream", "every")),
 }
-BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket"))
+BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket", "camera"))
+VIDEO_LINES: Final = frozenset(("camera",))
+"""Transport types that deliver only access units of a video, and accept no data."""
 CARRIERS: Final = frozenset(("ssh",))
 """Transport types that can be tunnels."""

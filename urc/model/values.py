@@ -52,10 +52,13 @@ SignalType = Literal[
     "occupancy_grid",
     "point_cloud",
     "transform_tree",
+    "video",
 ]
 """Signal types: a single value, an array of one type, a mapping, or bytes. The value of a transform
 tree is a mapping."""
-BINARY_TYPES: Final[tuple[SignalType, ...]] = ("image", "blob", "occupancy_grid", "point_cloud")
+BINARY_TYPES: Final[tuple[SignalType, ...]] = (
+    *("image", "blob", "occupancy_grid", "point_cloud", "video"),
+)
 """Types of signals whose values are bytes, which pages receive as binary messages."""
 WHOLE_TYPES: Final[tuple[SignalType, ...]] = ("occupancy_grid", "point_cloud", "transform_tree")
 """Types of signals that are whole messages, which only the form ``json`` can read."""

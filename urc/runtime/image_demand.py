@@ -4,7 +4,8 @@ Layer 4. A bridge sends a subscribed camera at its full rate, even if every page
 camera. URC therefore unsubscribes from a topic while its images have no viewers, and subscribes
 again for the next viewer. The robot remains connected: a topic is paused only while another
 topic of the same connection delivers messages. If the connection falls silent after a pause, URC
-subscribes to all its topics and never pauses them again in this session.
+subscribes to all its topics and never pauses them again in this session. A transport of the type
+`camera` is paused as a whole: it closes its connection until the next viewer.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,12 +29,17 @@ MAX_LIVE_S: Final = 10.0
 for longer would look live to the next viewer, although the robot may have sent a newer one."""
 _TRANSPORTS: Final = ("ros",)
 """Transport types that can subscribe and unsubscribe during a connection."""
-_IMAGES: Final = ("image", "point_cloud")
+_CAMERAS: Final = ("camera",)
+"""Transport types that end their connection during a pause, so silence is expected."""
+_IMAGES: Final = ("image", "point_cloud", "video")
 """Types of the signals whose topics may be paused: frequent messages with many bytes."""
 
 
 class PausableTopics(NamedTuple):
-    """The topics of one transport that carry only images, and the signals of its other topics."""
+    """The topics of one transport that carry only images, and the signals of its other topics.
+
+    A camera has one topic without a name, and no other topics.
+    """
 
     images: Mapping[str, frozenset[str]]
     """Image signals of each topic that may be paused, keyed by topic."""
@@ -61,7 +67,12 @@ def pausable_topics(driver: Driver, settings: Mapping[str, Value]) -> dict[str, 
     }
     found = {}
     for name, spec in driver.transports.items():
-        if spec.type in _TRANSPORTS:
+        if spec.type in _CAMERAS:
+            messages = [one for one in driver.messages.values() if one.transport == name]
+            fields = frozenset(field for one in messages for field in one.read.fields)
+            if fields and fields <= images:
+                found[name] = PausableTopics({"": fields}, frozenset(), 0.0)
+        elif spec.type in _TRANSPORTS:
             topics = read_topics(driver, name, settings)
             paused = {topic: one.fields for topic, one in topics.items() if _may(one, images)}
             others = {
@@ -162,5 +173,7 @@ class ImageDemand:
 
     def _delivers_others(self, transport: str, now_s: float) -> bool:
         topics = self._topics[transport]
+        if not topics.others:
+            return True  # a camera, which delivers nothing else
         samples = filter(None, map(self._hub.latest, topics.others))
         return any(now_s - one.time_s <= topics.fresh_s for one in samples)

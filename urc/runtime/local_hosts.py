@@ -12,6 +12,7 @@ from typing import Final
 
 from urc._addresses import unmapped
 from urc.expressions import Template
+from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.problems import UrcError
 
@@ -44,12 +45,19 @@ def check_hosts(profile: Profile) -> None:
     for spec in profile.driver.transports.values():
         if spec.tunnel or spec.options.get("mode") == "listen":
             continue  # resolved on another machine, or the robot connects to URC
-        host = _fixed(spec.options)
+        host = "" if _is_listener(spec) else _fixed(spec.options)
         if host:
             raise UrcError(
                 f"{profile.file}: the transport {spec.name} has the fixed host {host}, which is"
                 " this machine: a package may use this machine only through a setting"
             )
+
+
+def _is_listener(spec: TransportSpec) -> bool:
+    """Return whether the URL is an address of this machine at which a camera's data arrives."""
+    url = spec.options.get("url")
+    text = url.source if isinstance(url, Template) else url
+    return spec.type == "camera" and isinstance(text, str) and text.lower().startswith("udp://")
 
 
 def _fixed(options: Mapping[str, object]) -> str:

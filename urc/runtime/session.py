@@ -34,7 +34,7 @@ from urc.runtime.link import Link
 from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
 from urc.runtime.settings import resolve_settings
-from urc.runtime.transport_chain import make_transports
+from urc.runtime.transport_chain import UNGUARDED, make_transports
 from urc.transports.base import GoalRecord, SupportsGoals, Transport
 
 if TYPE_CHECKING:
@@ -180,7 +180,9 @@ class Session:
         transports: Mapping[str, Transport]
         self._goals = GoalReports(())  # used without a backend
         if self.backend is not None:
-            transports = self.backend.transports
+            # Cameras stay out of the guard: they move nothing, and their images are large.
+            cameras = make_transports(driver, self.settings, table, only=UNGUARDED)
+            transports = {**self.backend.transports, **cameras}
         else:
             transports = make_transports(driver, self.settings, table)
             known = {n: one for n, one in transports.items() if isinstance(one, SupportsGoals)}

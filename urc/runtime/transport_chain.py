@@ -1,7 +1,7 @@
 """A driver's transports, ordered so that each tunnel precedes the transports that it carries."""
 
 from collections.abc import Mapping
-from typing import NamedTuple, cast
+from typing import Final, NamedTuple, cast
 
 from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
@@ -10,7 +10,11 @@ from urc.registry import Table
 from urc.runtime.settings import options_of
 from urc.transports.base import TopicSubscription, Transport, TransportSetup, Tunnel
 
-__all__ = ["BuiltTransport", "make_lines", "make_transports"]
+__all__ = ["UNGUARDED", "BuiltTransport", "make_lines", "make_transports"]
+
+UNGUARDED: Final = frozenset(("camera",))
+"""Transport types that stay in the server's process, because they accept no data and move nothing.
+"""
 
 
 class BuiltTransport(NamedTuple):
@@ -83,7 +87,26 @@ def _with_packed(
 
 
 def make_transports(
-    driver: Driver, settings: Mapping[str, Value], table: Table
+    driver: Driver,
+    settings: Mapping[str, Value],
+    table: Table,
+    *,
+    only: frozenset[str] | None = None,
 ) -> dict[str, Transport]:
-    """Return the closed transports by name, in the order of `make_lines`."""
-    return {name: made.transport for name, made in make_lines(driver, settings, table).items()}
+    """Return the closed transports by name, in the order of `make_lines`.
+
+    Args:
+        driver: the loaded driver, without circular tunnels.
+        settings: a value for every setting.
+        table: table of the available transport types.
+        only: the types of the returned transports; None for all types.
+
+    Raises:
+        UrcError: a transport cannot be built with these settings.
+    """
+    lines = make_lines(driver, settings, table)
+    return {
+        name: made.transport
+        for name, made in lines.items()
+        if only is None or made.spec.type in only
+    }

@@ -17,6 +17,7 @@ TRANSPORTS = Table(
         "ros": "urc.transports.ros.choice:from_setup",
         "mqtt": "urc.transports.mqtt:from_setup",
         "zenoh": "urc.transports.zenoh:from_setup",
+        "camera": "urc.transports.camera:from_setup",
     },
 )
 """Factories by transport type; each factory returns a `Transport` for a

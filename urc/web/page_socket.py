@@ -223,11 +223,11 @@ class BrowserClient:
         """Send the data that all pages share, then images until the kernel accepts no more data."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
-        while self._place.subscription.names and self._flow.is_free():
-            picture = live.fanout.cache.next_image(self._place.subscription)
-            if picture is None:
+        while self._place.shown and self._flow.is_free():
+            frame = live.fanout.next_picture(self._place)
+            if frame is None:
                 break
-            self._flow.write(picture.frame)
+            self._flow.write(frame)
 
     def _take_answers(self) -> list[str]:
         answers = list(self._answers)
@@ -293,7 +293,7 @@ class BrowserClient:
             self._drive(asked)
         elif isinstance(asked, ImageSelection):
             self._news.set()
-            live.fanout.show(self._place, asked.signals)
+            live.fanout.show(self._place, asked.signals, asked.stills)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)
         elif isinstance(asked, ScreenName):

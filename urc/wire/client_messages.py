@@ -77,6 +77,10 @@ class ImageSelection(
     signals: Annotated[
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
     ] = ()
+    stills: Annotated[
+        tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
+    ] = ()
+    """The videos among `signals` that the page cannot decode; the server sends JPEG images."""
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):

@@ -4,8 +4,10 @@
  *
  * @typedef {import("../../urc/web/static/core/types.js").Picture} Picture
  *
+ * @typedef {import("../../urc/web/static/core/types.js").VideoImage} VideoImage
+ *
  * @typedef {object} Shown
- * @property {Blob} blob
+ * @property {Blob | null} blob null for an image of a video
  * @property {number} width pixels
  * @property {number} height
  */
@@ -18,7 +20,7 @@ export class Newest {
   constructor(show, failed) {
     this.show = show;
     this.failed = failed;
-    /** @type {Picture | null} */
+    /** @type {Picture | VideoImage | null} */
     this.next = null;
     this.serial = -1;
     this.isBusy = false;
@@ -29,7 +31,7 @@ export class Newest {
     this.shown = null;
   }
 
-  /** @param {Picture} picture */
+  /** @param {Picture | VideoImage} picture */
   take(picture) {
     if (this.isOver || picture.serial === this.serial) return;
     this.serial = picture.serial;
@@ -40,15 +42,17 @@ export class Newest {
   async work() {
     this.isBusy = true;
     while (this.next && !this.isOver) {
-      const { blob } = this.next;
+      const picture = this.next;
+      const blob = "blob" in picture ? picture.blob : null;
       const { source } = this;
       this.next = null;
       try {
-        const bitmap = await createImageBitmap(blob);
+        const bitmap = await createImageBitmap("blob" in picture ? picture.blob : picture.bitmap);
         if (this.isOver || source !== this.source) bitmap.close();
         else this.replace(bitmap, blob);
       } catch {
-        if (!this.isOver && source === this.source) this.failed(blob);
+        // A newer image of a video closes the earlier bitmap.
+        if (blob && !this.isOver && source === this.source) this.failed(blob);
       }
     }
     this.isBusy = false;
@@ -56,7 +60,7 @@ export class Newest {
 
   /**
    * @param {ImageBitmap} bitmap
-   * @param {Blob} blob
+   * @param {Blob | null} blob
    */
   replace(bitmap, blob) {
     this.shown = { blob, width: bitmap.width, height: bitmap.height };

@@ -157,9 +157,15 @@ class Camera {
     attribute(this.root, "data-state", reading?.state ?? "none");
     attribute(this.root, "data-locked", look?.reason ? "yes" : null);
     this.locked = look?.reason ?? "";
-    if (reading?.image && reading.value !== null) this.pictures.take(reading.image);
+    this.take(reading);
     if (this.shutter) this.shutter.disabled = !this.pictures.shown || !reading || reading.value === null;
     this.tell();
+  }
+
+  /** @param {Reading | undefined} reading */
+  take(reading) {
+    const picture = reading?.image ?? reading?.video;
+    if (picture && reading?.value !== null) this.pictures.take(picture);
   }
 
   /** Show a button for each camera. Titles arrive with the signals, sometimes after the first reading. */
@@ -196,7 +202,7 @@ class Camera {
     this.draw();
     const reading = this.sources[index];
     attribute(this.root, "data-state", reading?.state ?? "none");
-    if (reading?.image && reading.value !== null) this.pictures.take(reading.image);
+    this.take(reading);
     this.tell();
   }
 
@@ -249,7 +255,7 @@ class Camera {
   async keep() {
     const { shown } = this.pictures;
     if (!shown) return;
-    const bitmap = await createImageBitmap(shown.blob);
+    const bitmap = await createImageBitmap(shown.blob ?? this.canvas);
     const { rotate, mirror } = this.look;
     const isLying = (rotate / 90) % 2 === 1;
     const canvas = document.createElement("canvas");

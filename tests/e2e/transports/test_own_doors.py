@@ -39,6 +39,7 @@ def lines(host: str, port: int) -> Mapping[str, Mapping[str, object]]:
         "ros": place,
         "mqtt": place,
         "zenoh": place,
+        "camera": {"url": f"rtsp://{shown}:{port}/"},
         "ssh": {**place, **login},
     }
 

@@ -173,3 +173,36 @@ async def test_a_viewer_is_noticed_at_once(desk: Desk) -> None:
     await settle()
     running.cancel()
     assert desk.sent == ["subscribe /front"]
+
+
+CAMERA = """
+urc: 1
+kind: robot
+name: eye
+title: Eye
+transports:
+  eye: { type: camera, url: "rtsp://127.0.0.1/cam" }
+signals:
+  picture: { type: video, stale_after: AGE }
+messages:
+  picture: { raw: picture }
+"""
+
+
+@pytest.mark.parametrize(("age", "is_paused"), [("2s", True), ("60s", False)])
+async def test_a_camera_without_viewers_is_paused_as_a_whole(
+    age: str, is_paused: bool, tmp_path: Path
+) -> None:
+    """It delivers nothing else, so its silence says nothing. Old images never look live."""
+    driver, clock = driver_of(tmp_path, CAMERA.replace("AGE", age)), FakeClock()
+    hub, sent = Hub(driver.signals), list[str]()
+    topics = pausable_topics(driver, {})
+    demand = ImageDemand(topics, hub, lambda _, envelope: sent.append(envelope.verb), clock)
+    hub.set_link(LinkStatus("eye", "live", "camera", clock.now()))
+    for _ in range(10):
+        demand.check()
+        await clock.advance(1.0)
+    assert sent == (["unsubscribe"] if is_paused else [])
+    with hub.viewers.viewing(["picture"]):
+        demand.check()
+        assert sent == (["unsubscribe", "subscribe"] if is_paused else [])

@@ -86,3 +86,32 @@ def test_a_package_fixes_no_host_to_this_machine(line: str, host: str, tmp_path:
     ) as told:
         check_hosts(profile)
     assert f"the transport wire has the fixed host {host}, which is this machine" in str(told.value)
+
+
+CAMERA = """
+urc: 1
+kind: robot
+name: eye
+transports:
+  eye: {{ type: camera, url: "{url}" }}
+signals:
+  picture: {{ type: video }}
+messages:
+  picture: {{ raw: picture }}
+"""
+
+
+@pytest.mark.parametrize(
+    ("url", "is_fine"),
+    [("udp://0.0.0.0:11111", True), ("rtsp://127.0.0.1/", False), ("http://0.0.0.0/", False)],
+)
+def test_a_package_may_receive_a_video_on_a_port(url: str, is_fine: bool, tmp_path: Path) -> None:
+    """A udp URL is where the data arrives, so it leads to no program of this machine."""
+    file = tmp_path / "near.yaml"
+    file.write_text(CAMERA.format(url=url), "utf-8")
+    profile = open_document(str(file))
+    if is_fine:
+        check_hosts(profile)
+        return
+    with pytest.raises(UrcError, match="which is this machine"):
+        check_hosts(profile)

@@ -1,10 +1,10 @@
 """Checks whether messages fit the type of their transport."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 from urc.config.form_table import WRITE_FORMS
 from urc.config.link.keys import check_key, check_sent_keys
-from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING
+from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_LINES
 from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Driver, TransportSpec
@@ -20,6 +20,7 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
         _check_read(inner, spec, problems, wants_topic=True)
+        _check_video(inner, spec, driver, driver.messages[name].read.fields, problems)
         _check_answer(inner.get("acknowledge"), spec, problems)
     for place, inner in _requests(part):
         spec = driver.transports.get(_target(place, driver))
@@ -41,6 +42,36 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
                 if send is not None:
                     data = send.data
                     is_asked = isinstance(data, dict) and not data.keys().isdisjoint(_ANSWERED)
+
+
+def _check_video(
+    part: Node,
+    spec: TransportSpec | None,
+    driver: Driver,
+    fields: Collection[str],
+    problems: Problems,
+) -> None:
+    """Report a camera's message that sets no video, and a video from another transport."""
+    if spec is None:
+        return
+    signals = [driver.signals[name] for name in fields if name in driver.signals]
+    is_video = [one.type == "video" for one in signals]
+    if spec.type in VIDEO_LINES and not ("raw" in part.data and is_video and all(is_video)):
+        problems.error(
+            part,
+            "wrong-form",
+            f"{spec.type} delivers only a video",
+            key=True,
+            hint="write raw: NAME, where the signal NAME has type: video",
+        )
+    elif spec.type not in VIDEO_LINES and any(is_video) and spec.type in (*MESSAGING, *BYTE_LINES):
+        problems.error(
+            part,
+            "wrong-form",
+            f"{spec.type} delivers no video",
+            key=True,
+            hint="declare a transport of type: camera, and the signal of this message as an image",
+        )
 
 
 def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Problems) -> None:
@@ -87,7 +118,15 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
     data = part.data
     form = next((key for key in data if key in WRITE_FORMS), "") if isinstance(data, dict) else ""
     kind = MESSAGING.get(spec.type)
-    if kind is not None and form not in kind.verbs:
+    if spec.type in VIDEO_LINES:
+        problems.error(
+            part,
+            "wrong-form",
+            f"{spec.type} accepts no data, so nothing can be sent to it",
+            key=True,
+            hint="name another transport in 'to', such as http for the camera's settings",
+        )
+    elif kind is not None and form not in kind.verbs:
         verbs = ", ".join(kind.verbs)
         problems.error(
             part,

@@ -36,6 +36,9 @@ _OTHER_WORDS = {
     "ws": "websocket",
     "ros2": "ros",
     "roslibjs": "ros",
+    "rtsp": "camera",
+    "video": "camera",
+    "webcam": "camera",
 }
 """Transport types, keyed by the word that other programs use."""
 

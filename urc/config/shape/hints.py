@@ -63,6 +63,7 @@ _SAME_TYPES: Final = {
     "dict": "object",
     "map": "object",
     "picture": "image",
+    "h264": "video",
     "costmap": "occupancy_grid",
     "pointcloud": "point_cloud",
     "PointCloud2": "point_cloud",

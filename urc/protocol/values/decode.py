@@ -22,7 +22,12 @@ from urc.protocol.values.convert import (
 from urc.protocol.values.occupancy_grid import GridConverter, grid_message
 from urc.protocol.values.point_cloud import cloud_converter, cloud_message
 from urc.protocol.values.transform_tree import tree_message
-from urc.protocol.values.vectors import array_converter, bytes_converter, object_converter
+from urc.protocol.values.vectors import (
+    array_converter,
+    bytes_converter,
+    object_converter,
+    video_converter,
+)
 
 __all__ = ["BadValue", "Convert", "build_converter", "build_raw"]
 
@@ -41,6 +46,8 @@ def build_converter(signal: Signal) -> Convert:
         return GridConverter()
     if signal.type == "point_cloud":
         return cloud_converter(signal)
+    if signal.type == "video":
+        return _usable(video_converter)
     if signal.type in ("image", "blob"):
         return _usable(bytes_converter(signal))
     element = _element_converter(signal)

@@ -16,6 +16,7 @@ from urc.images import MAX_PIXELS, picture_size, pixels
 from urc.model.values import Reading, Signal, Value
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.ros_image import picture_of
+from urc.video import read_unit
 
 __all__ = [
     "MAX_BYTES",
@@ -25,7 +26,7 @@ __all__ = [
     "bytes_of",
     "bytes_text",
 ]
-__all__ += ["elements_of", "object_converter"]
+__all__ += ["elements_of", "object_converter", "video_converter"]
 
 MAX_ELEMENTS = 65536
 """Maximum number of elements in an array."""
@@ -98,6 +99,21 @@ def bytes_converter(signal: Signal) -> Callable[[object], Reading]:
         return data
 
     return convert
+
+
+def video_converter(raw: object) -> Reading:
+    """Return an access unit of a video unchanged; raise `BadValue` for other bytes."""
+    if raw is None:
+        return None
+    data = bytes_of(raw)
+    unit = read_unit(data)
+    if unit is None:
+        raise BadValue(f"{len(data)} bytes that are no access unit of a video")
+    if unit.width * unit.height > MAX_PIXELS:
+        raise BadValue(
+            f"an image of {unit.width} by {unit.height} pixels; the limit is {MAX_PIXELS} in total"
+        )
+    return data
 
 
 def bytes_of(raw: object) -> bytes:

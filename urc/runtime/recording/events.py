@@ -91,6 +91,7 @@ _KINDS: Final[Mapping[str, type | tuple[type, ...]]] = {
     "occupancy_grid": str,
     "point_cloud": str,
     "blob": str,
+    "video": str,
 }
 
 

@@ -15,6 +15,8 @@ from urc.model.values import NOTHING, Sample
 from urc.runtime.clock import Clock, LoopClock, Timer
 from urc.runtime.hub import Hub
 from urc.web.feed.image_cache import ImageCache, ImageSubscription, is_picture
+from urc.web.feed.video_feed import VideoFeed, VideoSubscription
+from urc.web.feed.video_stills import VideoStills
 from urc.web.wire.ask import encode_progress
 from urc.web.wire.messages import (
     Indexes,
@@ -57,6 +59,9 @@ class Place:
 
     known: FanoutPosition = field(default_factory=FanoutPosition)
     subscription: ImageSubscription = field(default_factory=ImageSubscription)
+    videos: VideoSubscription = field(default_factory=VideoSubscription)
+    shown: tuple[str, ...] = ()
+    """Signals of both subscriptions, counted as viewed."""
 
 
 class _Update(NamedTuple):
@@ -126,19 +131,22 @@ class Fanout:
         self._movers = frozenset(movers)
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.cache = ImageCache(hub, self._clock)
+        self.videos = VideoFeed(hub, self._clock)
+        self.stills = VideoStills(hub, self.videos, self.cache, self._changed, self._clock)
 
     async def run(self) -> None:
         """Flush until cancelled; raise the exception of a failed flush."""
         self._loop = asyncio.get_running_loop()  # cached, because each call costs a system call
         self._broken = self._loop.create_future()
         try:
-            with self.hub.heed(self._changed):
+            with self.hub.passed_to(self.videos.take), self.hub.heed(self._changed):
                 if self.hub.revision:
                     self._changed()
                 await self._broken
         finally:
             if self._due is not None:
                 self._due.cancel()
+            await self.stills.close()
 
     def _changed(self) -> None:
         """Schedule a flush for a later iteration of the event loop, as soon as the rate permits."""
@@ -172,12 +180,32 @@ class Fanout:
         notes = max(0, self.hub.notes_count - LOG_LINES_FOR_NEWCOMERS)
         return Place(FanoutPosition(notes=notes, joined=self.hub.revision))
 
-    def show(self, place: Place, names: Iterable[str]) -> None:
-        """Set the images that a client shows, and count the client as their viewer."""
-        viewers, subscription = self.hub.viewers, place.subscription
-        viewers.remove(subscription.names)
-        subscription.show(names)
-        viewers.add(subscription.names)
+    def show(self, place: Place, names: Iterable[str], stills: Iterable[str] = ()) -> None:
+        """Set the images that a client shows, and count the client as their viewer.
+
+        Args:
+            place: the client's position.
+            names: the images and videos that the client shows.
+            stills: the videos among `names` that the client cannot decode.
+        """
+        shown = tuple(dict.fromkeys(names))
+        is_video = self.videos.groups.keys() - set(stills)
+        viewers = self.hub.viewers
+        viewers.remove(place.shown)
+        place.shown = shown
+        place.videos.show(name for name in shown if name in is_video)
+        place.subscription.show(name for name in shown if name not in is_video)
+        viewers.add(shown)
+        self.stills.show(place, self.videos.groups.keys() & place.subscription.names)
+
+    def next_picture(self, place: Place) -> bytes | None:
+        """Return the frame with the next image or access unit for the client; None if none."""
+        if place.videos.names and (frame := self.videos.next_frame(place.videos)) is not None:
+            return frame
+        if not place.subscription.names:
+            return None
+        picture = self.cache.next_image(place.subscription)
+        return None if picture is None else picture.frame
 
     def leave(self, wake: Callable[[], None], place: Place) -> None:
         """Stop calling `wake`; the client at `place` has left."""

@@ -59,6 +59,8 @@ class ImageCache:
     def __init__(self, hub: Hub, clock: Clock) -> None:
         self._hub = hub
         self._clock = clock
+        self.stills: dict[str, Sample] = {}
+        """Newest JPEG image of each video that some page cannot decode."""
         self._encoded: dict[str, EncodedImage] = {}
         self._count = 0
 
@@ -75,7 +77,9 @@ class ImageCache:
         return None
 
     def _newest(self, name: str) -> EncodedImage | None:
-        sample = self._hub.latest(name)
+        signal = self._hub.signals.get(name)
+        is_video = signal is not None and signal.type == "video"
+        sample = self.stills.get(name) if is_video else self._hub.latest(name)
         if sample is None or not isinstance(sample.value, bytes):
             return None
         known, now_s = self._encoded.get(name), self._clock.now()

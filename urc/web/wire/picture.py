@@ -1,16 +1,17 @@
-"""Images and other byte values of a signal, as binary messages over a dashboard's WebSocket.
+"""Images, videos and other byte values, as binary messages over a dashboard's WebSocket.
 
-Layer 5. Pure. Each message contains one complete image. `urc.wire.picture` defines the message's
-layout, and ``frames.js`` decodes the message.
+Layer 5. Pure. Each message contains one complete image or one access unit. `urc.wire.picture`
+defines the layout, and ``frames.js`` decodes the messages.
 
 All clients receive identical bytes, so the WebSocket frame is built only once. According to RFC
 6455, section 5.2, a server does not mask frames.
 """
 
 from urc.images import media_type
-from urc.wire.picture import PICTURE, PICTURE_HEADER
+from urc.video import VideoUnit
+from urc.wire.picture import PICTURE, PICTURE_HEADER, VIDEO, VIDEO_HEADER
 
-__all__ = ["as_frame", "encode_picture"]
+__all__ = ["as_frame", "encode_picture", "encode_video"]
 
 _OLDEST_MS = 2**32 - 1
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
@@ -31,6 +32,24 @@ def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
     kind = media_type(data).encode("ascii")
     age_ms = min(max(age_ms, 0), _OLDEST_MS)
     return PICTURE_HEADER.pack(PICTURE, len(kind), index, age_ms, now_ms) + kind + data
+
+
+def encode_video(index: int, unit: VideoUnit, number: int, age_ms: int, now_ms: int) -> bytes:
+    """Return the binary message with an access unit.
+
+    Args:
+        index: index of the signal in the `names` of `HelloMessage`.
+        unit: the access unit.
+        number: number of the unit within its signal.
+        age_ms: age of the unit at `now_ms`, in milliseconds.
+        now_ms: time on the server's clock, in milliseconds.
+    """
+    codec = unit.codec.encode("ascii")
+    head = VIDEO_HEADER.pack(
+        *(VIDEO, len(codec), index, min(max(age_ms, 0), _OLDEST_MS), now_ms),
+        *(number % 2**32, unit.width, unit.height, unit.is_key),
+    )
+    return head + codec + unit.data
 
 
 def as_frame(message: bytes, *, is_text: bool = False) -> bytes:

@@ -24,6 +24,7 @@ from urc.runtime.hub import (
 from urc.runtime.recording.events import event_of
 from urc.runtime.recording.shapes import DRIVING, LOG, RecordingEncoder, channels
 from urc.testing.profile import text
+from urc.video import VideoUnit, encode_unit
 
 BORN_NS = 1_700_000_000_000_000_000
 FLOOR = encode_grid(Grid(2, 1, 0.05, -1.0, 2.0, 0.5, "map", b"\x00\xff"))
@@ -43,6 +44,7 @@ SIGNALS = {
         Signal("floor", "occupancy_grid"),
         Signal("cloud", "point_cloud"),
         Signal("dump", "blob"),
+        Signal("film", "video"),
         Signal("isOn", "boolean"),
     )
 }
@@ -120,6 +122,7 @@ EVENTS: Mapping[str, Tapped] = {
     "coloured points": Sample("cloud", CLOUDS[1], 1.5),
     "plain points": Sample("cloud", CLOUDS[2], 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
+    "video": Sample("film", encode_unit(VideoUnit("avc1.42", True, 4, 4, 1.5, b"\0")), 1.5),
     "line": LinkStatus(
         "wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3, is_ready=True
     ),

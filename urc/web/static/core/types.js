@@ -41,10 +41,15 @@
  * @property {number} serial Increases with each new reading, even if the value is equal.
  * @property {Signal} signal
  * @property {Picture | null} image Newest image, for signals of type image or blob.
+ * @property {VideoImage | null} [video] Newest decoded image, for signals of type video.
  *
  * @typedef {object} Picture An encoded image.
  * @property {Blob} blob
  * @property {string} type Media type, such as "image/jpeg".
+ * @property {number} serial Increases with each new image.
+ *
+ * @typedef {object} VideoImage A decoded image of a video.
+ * @property {ImageBitmap} bitmap Closed as soon as the next image is stored; copy it to keep it.
  * @property {number} serial Increases with each new image.
  *
  * @typedef {object} Conversion Conversion from a signal's unit to another: value · factor + offset.

@@ -11,12 +11,21 @@
  * @property {number} index
  * @property {number} ageMs
  * @property {number} sentMs
- * @property {string} type
+ * @property {string} type media type, or the codec string of a video
  * @property {Uint8Array<ArrayBuffer>} bytes
+ * @property {VideoPart} [video] Only for an access unit.
+ *
+ * @typedef {object} VideoPart
+ * @property {number} number Number of the access unit within its signal.
+ * @property {number} width pixels
+ * @property {number} height
+ * @property {boolean} isKey Whether decoding can start with this access unit.
  */
 
 const PICTURE = 1;
+const VIDEO = 2;
 const HEADER = 16;
+const VIDEO_HEADER = 25;
 
 /**
  * @param {ArrayBuffer} data
@@ -25,14 +34,24 @@ const HEADER = 16;
 export function frameOf(data) {
   if (data.byteLength < HEADER) return null;
   const view = new DataView(data);
-  const typeLength = view.getUint8(1);
-  if (view.getUint8(0) !== PICTURE || data.byteLength < HEADER + typeLength) return null;
-  const letters = new Uint8Array(data, HEADER, typeLength);
-  return {
+  const [kind, typeLength] = [view.getUint8(0), view.getUint8(1)];
+  if (kind !== PICTURE && kind !== VIDEO) return null;
+  const header = kind === VIDEO ? VIDEO_HEADER : HEADER;
+  if (data.byteLength < header + typeLength) return null;
+  const letters = new Uint8Array(data, header, typeLength);
+  const frame = {
     index: view.getUint16(2),
     ageMs: view.getUint32(4),
     sentMs: view.getFloat64(8),
     type: String.fromCharCode(...letters),
-    bytes: new Uint8Array(data, HEADER + typeLength),
+    bytes: new Uint8Array(data, header + typeLength),
   };
+  if (kind === PICTURE) return frame;
+  const video = {
+    number: view.getUint32(16),
+    width: view.getUint16(20),
+    height: view.getUint16(22),
+    isKey: view.getUint8(24) === 1,
+  };
+  return { ...frame, video };
 }

@@ -25,6 +25,7 @@ import { ViewSwitch } from "./view_switch.js";
 import { StopButton } from "../control/stop.js";
 import { tapWithAnyFinger } from "../control/second_finger.js";
 import { Store } from "./store.js";
+import { Videos } from "./videos.js";
 import { offerSystems } from "../core/units.js";
 import { said, t } from "../core/words.js";
 
@@ -40,6 +41,7 @@ const AGE_EVERY_MS = 250;
 
 const root = part(document, "[data-robot]");
 const store = new Store();
+const videos = new Videos(store, wakeWidgets, () => wake());
 const badge = new Badge(part(root, "[data-badge]"));
 const panel = new Panel(part(root, "[data-panel]"));
 
@@ -206,15 +208,22 @@ function shows(name) {
 
 /** Request only the visible images. */
 function askPictures() {
-  const signals = [...host.pictures(), ...stage.pictures()];
-  const wanted = JSON.stringify(signals);
-  if (wanted !== shown && socket.send({ t: "show", signals })) shown = wanted;
+  const signals = [...new Set([...host.pictures(), ...stage.pictures()])];
+  const stills = videos.undecoded(signals);
+  const wanted = JSON.stringify([signals, stills]);
+  if (wanted === shown || !socket.send(stills.length > 0 ? { t: "show", signals, stills } : { t: "show", signals })) return;
+  shown = wanted;
+  videos.keep(signals);
 }
 
 /** @param {ArrayBuffer} data */
 function takePicture(data) {
   const frame = frameOf(data);
   if (!frame) return;
+  if (frame.video) {
+    videos.take(frame, performance.now());
+    return;
+  }
   store.picture(frame, performance.now());
   wakeWidgets();
 }
@@ -234,7 +243,8 @@ function take(message) {
       stop.moving = [];
       screenName.tell();
       alarms.clear();
-      shown = "[]"; // a new connection sends no images before a request
+      videos.keep([]);
+      shown = "[[],[]]"; // a new connection sends no images before a request
       break;
     case "alarms":
       alarms.take(message);

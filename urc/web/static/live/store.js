@@ -17,7 +17,9 @@
  * @typedef {import("../core/types.js").State} State
  * @typedef {import("../core/types.js").Values} Values
  *
- * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture}} Sample
+ * @typedef {import("../core/types.js").VideoImage} VideoImage
+ *
+ * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture, video?: VideoImage}} Sample
  */
 import { SampleHistory } from "./sample_history.js";
 import { digitsIn } from "../core/number_format.js";
@@ -45,7 +47,7 @@ const LONG_LAG_MS = 1000;
 /** Stand-in for an undeclared signal. @type {Signal} */
 const UNKNOWN = { name: "", type: "string" };
 /** Types of signals that may hold images. */
-export const PICTURES = new Set(["image", "blob", "occupancy_grid", "point_cloud"]);
+export const PICTURES = new Set(["image", "blob", "occupancy_grid", "point_cloud", "video"]);
 
 export class Store {
   constructor() {
@@ -161,6 +163,32 @@ export class Store {
     const image = { blob: new Blob([bytes], { type }), type, serial: this.serial };
     const value = { bytes: bytes.byteLength };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, image });
+  }
+
+  /**
+   * Return the time of the measurement of a binary message, on the page's clock.
+   *
+   * @param {import("./frames.js").BinaryFrame} frame
+   * @param {number} nowMs
+   */
+  timeOf({ sentMs, ageMs }, nowMs) {
+    return nowMs - this.lagMs(sentMs, nowMs) - ageMs;
+  }
+
+  /**
+   * Store a decoded image of a video. Its time is the time of its access unit, so a decoder that stands
+   * still makes the reading stale.
+   *
+   * @param {string} name
+   * @param {ImageBitmap} bitmap
+   * @param {number} timeMs
+   */
+  videoImage(name, bitmap, timeMs) {
+    this.serial += 1;
+    this.samples.get(name)?.video?.bitmap.close();
+    const value = { bytes: bitmap.width * bitmap.height };
+    const video = { bitmap, serial: this.serial };
+    this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, video });
   }
 
   /**
@@ -280,6 +308,7 @@ export class Store {
       serial: sample?.serial ?? 0,
       signal,
       image: isShown ? (sample.image ?? null) : null,
+      video: isShown ? (sample.video ?? null) : null,
     };
   }
 

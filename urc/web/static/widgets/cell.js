@@ -451,7 +451,7 @@ export class Cell {
  * @param {number} nowMs
  */
 function lastAgeMs(signals, store, nowMs) {
-  const images = signals.filter((name) => store.samples.get(name)?.image);
+  const images = signals.filter((name) => store.samples.get(name)?.image ?? store.samples.get(name)?.video);
   const ages = [];
   for (const name of images.length > 0 ? images : signals) {
     const ageMs = store.lastAgeMs(name, nowMs);

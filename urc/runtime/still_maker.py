@@ -1,0 +1,108 @@
+"""JPEG images of videos, made for pages that cannot decode the videos.
+
+Layer 4. Some browsers lack the codec of a camera, and no browser decodes videos on a page without
+HTTPS. For these pages alone, a process decodes the video and makes at most ten images a second. The
+process ends with the last of these pages.
+"""
+
+import asyncio
+import logging
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.util import find_spec
+from typing import Any, Final
+
+from urc._extras import missing
+from urc.runtime.still_process import MADE, TAKEN
+
+__all__ = ["StillMaker"]
+
+_LARGEST: Final = 16_777_216
+_WAITING_BYTES: Final = 1_048_576
+"""Number of unwritten bytes at which access units are dropped until the next keyframe."""
+_AGAIN_S: Final = 2.0
+
+log = logging.getLogger(__name__)
+
+
+class StillMaker:
+    """The process that makes the JPEG images of one video, restarted if it ends."""
+
+    def __init__(self, name: str, made: Callable[[str, bytes, float], None]) -> None:
+        """Create a maker; `start` runs the process.
+
+        Args:
+            name: name of the signal.
+            made: function that receives the name, a JPEG file and its time of arrival in seconds.
+        """
+        self._name = name
+        self._made = made
+        self._process: asyncio.subprocess.Process | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._needs_key = True
+
+    def start(self) -> None:
+        """Start the process in the background."""
+        self._task = asyncio.create_task(self._run())
+
+    def take(self, value: bytes, *, is_key: bool) -> None:
+        """Pass an access unit to the process, unless the process is too slow. Never waits."""
+        pipe = self._process.stdin if self._process is not None else None
+        if pipe is None or pipe.is_closing():
+            self._needs_key = True
+            return
+        if is_key:
+            self._needs_key = False
+        if pipe.transport.get_write_buffer_size() > _WAITING_BYTES:
+            self._needs_key = True
+        if not self._needs_key:
+            pipe.write(TAKEN.pack(len(value)) + value)
+
+    async def stop(self) -> None:
+        """End the process. The method never raises."""
+        task, self._task = self._task, None
+        if task is not None:
+            task.cancel()
+            await asyncio.gather(task, return_exceptions=True)
+
+    async def _run(self) -> None:
+        if find_spec("av") is None:
+            log.warning("%s", missing(f"{self._name}: JPEG images of a video need", "av", "video"))
+            return
+        while True:
+            try:
+                await self._serve()
+            except (OSError, asyncio.IncompleteReadError, ValueError) as fault:
+                log.warning("%s: the process that makes JPEG images ended (%s)", self._name, fault)
+            await asyncio.sleep(_AGAIN_S)
+
+    async def _serve(self) -> None:
+        more: dict[str, Any] = {"start_new_session": True}
+        if sys.platform == "win32":
+            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-P", "-m", "urc.runtime.still_process"),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            limit=2**18,
+            **more,
+        )
+        self._process, self._needs_key = process, True
+        try:
+            while process.stdout is not None:
+                size, time_s = MADE.unpack(await process.stdout.readexactly(MADE.size))
+                if size > _LARGEST:
+                    raise ValueError("an image is too large")
+                self._made(self._name, await process.stdout.readexactly(size), time_s)
+        finally:
+            self._process = None
+            with suppress(ProcessLookupError):
+                process.kill()
+            if process.stdin is not None:
+                process.stdin.close()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(1.0):
+                    await process.wait()

@@ -1,0 +1,383 @@
+"""The process that takes one camera's stream apart into access units, without decoding images.
+
+``python -m urc.transports.camera_process`` is started by `urc.transports.camera_transport`. A
+library written in C parses the bytes of a camera, so the parser has a process of its own. A hostile
+or stuck stream can neither block nor crash the server, and the system limits its memory. The
+process opens no connection to the network: the stream arrives on standard input or through the
+relay of URC.
+
+The first line of standard input is a `DemuxJob` as JSON. Standard output contains records: length
+(u32) and kind (u8), then the content. The kind ``U`` is an access unit as the value of a signal
+(`urc.video`). The kind ``F`` is a fault in one line, and the last record.
+"""
+
+import json
+import os
+import struct
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable
+from io import RawIOBase
+from typing import Any, BinaryIO, Final, NamedTuple
+
+from urc._h264 import BadStream, StreamInfo, info_of, is_keyframe, with_parameter_sets
+from urc.images import MAX_PIXELS
+from urc.video import MAX_UNIT_BYTES, VideoUnit, encode_unit
+
+__all__ = ["FAULT", "RECORD", "UNIT", "DemuxFault", "DemuxJob", "UnitQueue", "UnitReader", "main"]
+
+RECORD: Final = struct.Struct(">Ic")
+UNIT: Final = b"U"
+FAULT: Final = b"F"
+QUEUE_BYTES: Final = 8_388_608
+QUEUE_UNITS: Final = 240
+"""Maximum number of queued access units: the oldest group of pictures is dropped first."""
+MEMORY_BYTES: Final = 2**31
+"""Address space of this process; the libraries need 0.5 GB of it before they start."""
+NO_KEYFRAME_S: Final = 20.0
+PROBE_BYTES: Final = 500_000
+PROBE_US: Final = 500_000
+"""Data and time for the detection of the stream's format."""
+_NETWORK_S: Final = 0.005
+"""Wait for a packet that shows that the library has no more packets in stock, in seconds."""
+_MOST_EARLY: Final = 200
+_CODECS: Final = {"h264": False, "hevc": True}
+"""Whether the codec is H.265, keyed by the library's name."""
+
+
+class DemuxFault(Exception):
+    """Raised for a stream that cannot be used, with a message in one line."""
+
+
+class DemuxJob(NamedTuple):
+    """A description of the stream to read."""
+
+    url: str = ""
+    """Address of the relay, for RTSP; "" for a stream on standard input."""
+    format: str = ""
+    """Name of the library's demuxer; "" to detect it among the permitted formats."""
+    over: str = "tcp"
+    """Whether RTP packets travel over ``tcp`` or ``udp``."""
+
+
+class UnitQueue:
+    """A bounded queue of records between the demuxer and standard output.
+
+    The demuxer never waits: a slow reader loses whole groups of pictures, oldest first. A group
+    without its beginning could not be decoded.
+    """
+
+    def __init__(self, max_units: int = QUEUE_UNITS, max_bytes: int = QUEUE_BYTES) -> None:
+        self._max_units = max_units
+        self._max_bytes = max_bytes
+        self._units: deque[tuple[bool, bytes]] = deque()
+        self._bytes = 0
+        self._needs_key = True
+        self._changed = threading.Condition()
+        self._is_over = False
+
+    def put(self, record: bytes, *, is_key: bool) -> None:
+        """Add an access unit; drop older groups, or this unit, if the queue is full."""
+        with self._changed:
+            if is_key:
+                self._needs_key = False
+            elif self._needs_key:
+                return
+            is_full = len(self._units) >= self._max_units or (
+                self._bytes + len(record) > self._max_bytes
+            )
+            if is_full:
+                self._units.clear()
+                self._bytes = 0
+                if not is_key:
+                    self._needs_key = True
+                    return
+            self._units.append((is_key, record))
+            self._bytes += len(record)
+            self._changed.notify()
+
+    def take(self) -> bytes | None:
+        """Return the next record, after a wait if necessary; None at the end."""
+        with self._changed:
+            while not self._units:
+                if self._is_over:
+                    return None
+                self._changed.wait()
+            _, record = self._units.popleft()
+            self._bytes -= len(record)
+            return record
+
+    def end(self) -> None:
+        """Make `take` return None after the remaining records."""
+        with self._changed:
+            self._is_over = True
+            self._changed.notify()
+
+
+class UnitReader:
+    """Turns the packets of one stream into access units, and checks them."""
+
+    def __init__(self, *, is_hevc: bool, extra: bytes = b"", began_s: float) -> None:
+        """Create a reader.
+
+        Args:
+            is_hevc: whether the stream is H.265 instead of H.264.
+            extra: parameter sets that the container states separately.
+            began_s: time of the first packet, in seconds.
+        """
+        self._is_hevc = is_hevc
+        self._extra = extra
+        self._key_s = began_s
+        """Time of the newest keyframe."""
+        self._info: StreamInfo | None = None
+
+    def unit(self, data: bytes, now_s: float) -> VideoUnit | None:
+        """Return a packet as an access unit; None before the first keyframe.
+
+        Raises:
+            DemuxFault: the stream exceeds a limit, or has no keyframes.
+        """
+        if len(data) > MAX_UNIT_BYTES:
+            raise DemuxFault(
+                f"an encoded image has {len(data)} bytes; the limit is {MAX_UNIT_BYTES}:"
+                " lower the bit rate in the camera's settings"
+            )
+        is_key = is_keyframe(data, is_hevc=self._is_hevc)
+        if is_key:
+            self._key_s = now_s
+            data = with_parameter_sets(data, self._extra, is_hevc=self._is_hevc)
+        elif now_s - self._key_s > NO_KEYFRAME_S:
+            raise DemuxFault(
+                f"no keyframe within {NO_KEYFRAME_S:g} s: set a keyframe interval of 1 s in the"
+                " camera's settings"
+            )
+        self._take_info(data)
+        if self._info is None:
+            return None
+        codec, width, height = self._info
+        return VideoUnit(codec, is_key, width, height, now_s, data)
+
+    def _take_info(self, data: bytes) -> None:
+        try:
+            found = info_of(data, is_hevc=self._is_hevc)
+        except BadStream as fault:
+            raise DemuxFault(f"the camera's stream is damaged: {fault}") from fault
+        if found is None:
+            return
+        if found.width * found.height > MAX_PIXELS:
+            raise DemuxFault(
+                f"the camera sends images of {found.width} by {found.height} pixels; the limit is"
+                f" {MAX_PIXELS} in total: select a smaller image in the camera's settings"
+            )
+        self._info = found
+
+
+class EarlyUnits:
+    """The access units that the library has kept while it detected the format, with honest times.
+
+    The library delivers them all at once, so the time of delivery would make them too young. The
+    last one has just arrived. The time stamps of the stream tell how much older the others are.
+    """
+
+    def __init__(self, opened_s: float) -> None:
+        """Begin a stream whose first byte arrived at `opened_s` or later."""
+        self._opened_s = opened_s
+        self._units: list[tuple[VideoUnit, float | None]] = []
+        self.is_over = False
+
+    def add(self, unit: VideoUnit, pts_s: float | None) -> None:
+        """Add a unit with its time stamp in the stream, in seconds."""
+        self._units.append((unit, pts_s))
+
+    def ends(self, waited_s: float) -> bool:
+        """Return whether a wait for the next unit shows that it comes from the network."""
+        return waited_s > _NETWORK_S or len(self._units) >= _MOST_EARLY
+
+    def stamped(self) -> list[VideoUnit]:
+        """Return all units with their times of arrival, and end the early phase."""
+        self.is_over = True
+        if not self._units:
+            return []
+        count, (newest, last_pts) = len(self._units), self._units[-1]
+        end_s, found = newest.time_s, []
+        for place, (unit, pts_s) in enumerate(self._units):
+            spread_s = (end_s - self._opened_s) * (count - 1 - place) / count
+            older_s = spread_s if pts_s is None or last_pts is None else last_pts - pts_s
+            older_s = max(0.0, min(older_s, end_s - self._opened_s))
+            found.append(unit._replace(time_s=end_s - older_s))
+        return found
+
+
+def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
+    """Read a stream until its end, and put its access units into a queue.
+
+    Raises:
+        DemuxFault: the stream ended or cannot be used.
+    """
+    import av  # the extra `video`: takes 150 ms
+
+    early = EarlyUnits(time.monotonic())
+    try:
+        with _opened(av, job, source) as container:
+            found = container.streams.video
+            if not found:
+                raise DemuxFault("the camera's stream contains no video")
+            stream = found[0]
+            name = stream.codec_context.name
+            if name not in _CODECS:
+                raise DemuxFault(
+                    f"the camera sends {name}; URC supports H.264 and H.265: select one of them in"
+                    " the camera's settings"
+                )
+            _read_stream(av, container, stream, queue, early, is_hevc=_CODECS[name])
+    except av.error.FFmpegError as fault:
+        raise DemuxFault(_words(av, fault)) from fault
+    raise DemuxFault("the camera ended the stream")
+
+
+def _opened(av: Any, job: DemuxJob, source: RawIOBase) -> Any:
+    limits = {
+        "probesize": str(PROBE_BYTES),
+        "analyzeduration": str(PROBE_US),
+        "fflags": "discardcorrupt",
+        "max_delay": "200000",
+    }
+    if job.url:
+        options = {
+            **limits,
+            "rtsp_transport": job.over,
+            "allowed_media_types": "video",
+            "protocol_whitelist": "rtsp,rtp,udp,tcp",
+            "user_agent": "urc",
+            "reorder_queue_size": "64",
+        }
+        return av.open(job.url, options=options, timeout=(10.0, 10.0))
+    options = {**limits, "protocol_whitelist": "", "format_whitelist": "mov,mpegts,h264,hevc"}
+    return av.open(source, format=job.format or None, options=options, buffer_size=4096)
+
+
+def _read_stream(
+    av: Any,
+    container: Any,
+    stream: Any,
+    queue: UnitQueue,
+    early: EarlyUnits,
+    *,
+    is_hevc: bool,
+) -> None:
+    extra = stream.codec_context.extradata or b""
+    reader = UnitReader(is_hevc=is_hevc, extra=_plain(extra), began_s=time.monotonic())
+    convert = None
+    if extra and not _has_start_code(extra):  # MP4: lengths instead of start codes
+        name = "hevc_mp4toannexb" if is_hevc else "h264_mp4toannexb"
+        convert = av.BitStreamFilterContext(name, stream)
+    asked_s = time.monotonic()
+    for packet in container.demux(stream):
+        came_s = time.monotonic()
+        has_data = packet.size > 0  # the filter empties the packet
+        if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
+            _put(early.stamped(), queue)
+        packets: Iterable[Any] = [packet] if convert is None else convert.filter(packet)
+        for one in packets if has_data else ():
+            unit = reader.unit(bytes(one), came_s)
+            if unit is not None and early.is_over:
+                _put([unit], queue)
+            elif unit is not None:
+                early.add(unit, None if one.pts is None else float(one.pts * one.time_base))
+        asked_s = time.monotonic()
+
+
+def _put(units: Iterable[VideoUnit], queue: UnitQueue) -> None:
+    for unit in units:
+        queue.put(_record(UNIT, encode_unit(unit)), is_key=unit.is_key)
+
+
+def _has_start_code(data: bytes) -> bool:
+    return data.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01"))
+
+
+def _plain(extra: bytes) -> bytes:
+    """Return parameter sets with start codes; b"" if the container stores them differently."""
+    return extra if _has_start_code(extra) else b""
+
+
+def _words(av: Any, fault: Exception) -> str:
+    """Return a library error in one line."""
+    errors = av.error
+    for kind, words in (
+        (errors.HTTPUnauthorizedError, "the camera refuses the user name or the password"),
+        (errors.HTTPForbiddenError, "the camera refuses the user name or the password"),
+        (errors.HTTPNotFoundError, "the camera has no stream at this path of the url"),
+        (errors.InvalidDataError, "the stream is neither H.264 nor H.265 in a known format"),
+        (errors.TimeoutError, "the camera stopped sending"),
+        (errors.EOFError, "the camera ended the stream"),
+    ):
+        if isinstance(fault, kind):
+            return words
+    return f"the stream cannot be read ({getattr(fault, 'strerror', fault)})"
+
+
+def _record(kind: bytes, content: bytes) -> bytes:
+    return RECORD.pack(len(content), kind) + content
+
+
+def _limit_memory() -> None:
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _end_with(source: RawIOBase) -> None:
+    """End the process as soon as standard input ends, which the server's death also causes."""
+    while source.read(4096):
+        pass
+    os._exit(0)
+
+
+def _write_all(queue: UnitQueue, target: BinaryIO) -> None:
+    try:
+        while (record := queue.take()) is not None:
+            target.write(record)
+            target.flush()
+    except OSError:
+        os._exit(0)  # the server has closed the pipe
+
+
+def main() -> int:
+    """Run the process; return the exit code."""
+    _limit_memory()
+    source, target = os.fdopen(0, "rb", buffering=0), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # so that no library's text reaches the records
+    line = bytearray()
+    while not line.endswith(b"\n"):
+        piece = source.read(1)
+        if not piece:
+            return 0
+        line += piece
+    job, queue = DemuxJob(**json.loads(line)), UnitQueue()
+    writer = threading.Thread(target=_write_all, args=(queue, target), daemon=True)
+    writer.start()
+    if job.url:
+        threading.Thread(target=_end_with, args=(source,), daemon=True).start()
+    try:
+        read_units(job, source, queue)
+    except DemuxFault as fault:
+        queue.put(_record(FAULT, str(fault).encode()), is_key=True)
+    except MemoryError:
+        queue.put(_record(FAULT, b"the stream needs too much memory"), is_key=True)
+    except Exception as bug:  # supervisor: the server reports the reason
+        text = f"the stream cannot be read ({type(bug).__name__}: {bug})"
+        queue.put(_record(FAULT, text.encode()), is_key=True)
+    queue.end()
+    writer.join(2.0)
+    return 0
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stderr.flush()
+    os._exit(code)  # without waiting for the library's threads

@@ -1,0 +1,339 @@
+"""The camera transport: URC's connection to a camera, and the process that reads the stream.
+
+Each payload that the transport receives is one access unit (`urc.video`). The camera's process ends
+with the connection. While no reader needs the images, the transport stays open without a connection
+(`urc.runtime.image_demand`).
+"""
+
+import asyncio
+import json
+import logging
+import subprocess
+import sys
+from collections.abc import Coroutine
+from contextlib import suppress
+from typing import Any, Final
+from urllib.parse import quote
+
+from urc.model.payload import Envelope, Payload
+from urc.transports._faults import CLOSED, one_line
+from urc.transports._stream_dialer import StreamDialer
+from urc.transports.base import PeerClosed, TransportError
+from urc.transports.camera_options import CameraOptions
+from urc.transports.camera_process import FAULT, RECORD, DemuxJob
+from urc.transports.camera_relay import RtspRelay, RtspWatch
+from urc.transports.http_body import fault_of
+from urc.transports.http_client import HttpClient
+from urc.transports.udp import UdpTransport
+from urc.transports.web_dial import Dialer
+from urc.video import MAX_UNIT_BYTES
+
+__all__ = ["CameraTransport"]
+
+FIRST_S: Final = 15.0
+"""Maximum time from the connection to the first image, in seconds. Some cameras send a keyframe
+only every 10 s."""
+SILENCE_S: Final = 5.0
+"""Maximum time between two images, in seconds; afterwards, the connection counts as lost."""
+RESUME_S: Final = 5.0
+_TS_PACKET: Final = 188
+_TS_SYNC: Final = 0x47
+_MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
+
+log = logging.getLogger(__name__)
+
+
+class CameraTransport:
+    """A reusable transport to one camera."""
+
+    def __init__(self, options: CameraOptions) -> None:
+        """Store the options, without connecting."""
+        self._options = options
+        self._connection: _CameraConnection | None = None
+        self._is_open = False
+        self._is_paused = False
+        self._resumed = asyncio.Event()
+
+    @property
+    def address(self) -> str:
+        """The camera's address in readable form."""
+        return self._options.address
+
+    async def open(self, timeout_s: float) -> None:
+        """Connect within `timeout_s` seconds, or raise `ConnectFailed`."""
+        await self.close()
+        self._is_paused = False
+        self._connection = await _connected(self._options, timeout_s)
+        self._is_open = True
+
+    async def receive(self) -> bytes:
+        """Return the next access unit; wait while the transport is paused.
+
+        Raises:
+            PeerClosed: the connection has ended, or the stream cannot be used.
+        """
+        while True:
+            if not self._is_open:
+                raise PeerClosed(CLOSED)
+            if self._is_paused:
+                self._resumed.clear()
+                await self._resumed.wait()
+                continue
+            if self._connection is None:
+                self._connection = await self._reconnected()
+            connection = self._connection
+            try:
+                return await connection.unit()
+            except PeerClosed:
+                if self._is_used(connection):
+                    raise
+
+    async def send(self, data: Payload) -> None:
+        """Pause or resume the stream; raise `TransportError` for all other data."""
+        if not isinstance(data, Envelope) or data.verb not in ("subscribe", "unsubscribe"):
+            raise TransportError("a camera accepts no data")
+        self._is_paused = data.verb == "unsubscribe"
+        if self._is_paused:
+            await self._end()
+        self._resumed.set()
+
+    async def close(self) -> None:
+        """Close immediately. The method never raises and may be called twice."""
+        self._is_open = False
+        self._resumed.set()
+        await self._end()
+
+    def _is_used(self, connection: "_CameraConnection") -> bool:
+        """Return whether a pause or a new connection has not replaced the connection."""
+        return not self._is_paused and connection is self._connection
+
+    async def _reconnected(self) -> "_CameraConnection":
+        try:
+            return await _connected(self._options, RESUME_S)
+        except TransportError as fault:
+            raise PeerClosed(str(fault)) from fault
+
+    async def _end(self) -> None:
+        connection, self._connection = self._connection, None
+        if connection is not None:
+            await connection.close()
+
+
+class _CameraConnection:
+    """One connection to a camera, with the process that reads its stream."""
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._process: asyncio.subprocess.Process | None = None
+        self._feeding: asyncio.Task[None] | None = None
+        self._closers: list[Coroutine[Any, Any, None]] = []
+        self._relay: RtspRelay | None = None
+        self._reason = ""
+        self._started = asyncio.Event()
+        self._has_unit = False
+
+    async def use_relay(self, relay: RtspRelay, job: DemuxJob) -> None:
+        """Start the process on a relay."""
+        self._relay = relay
+        await self.start(job)
+
+    def feed(self, source: Coroutine[Any, Any, None]) -> None:
+        """Run a task that starts the process and writes the stream to it."""
+        self._feeding = asyncio.create_task(self._fed(source))
+
+    async def start(self, job: DemuxJob) -> None:
+        """Start the process."""
+        # -P: nothing is imported from the current folder. Ctrl-C is meant for the server.
+        command = [sys.executable, "-P", "-m", "urc.transports.camera_process"]
+        more: dict[str, Any] = {"start_new_session": True}
+        if sys.platform == "win32":
+            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        self._process = await asyncio.create_subprocess_exec(
+            *command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            limit=2**18,
+            **more,
+        )
+        # Not an argument: every user of this computer can read arguments, and the URL of the relay
+        # contains the password.
+        await self.write(json.dumps(job._asdict()).encode() + b"\n")
+        self._started.set()
+
+    async def write(self, data: bytes) -> None:
+        """Pass bytes of the stream to the process, and wait until they are taken.
+
+        Raises:
+            PeerClosed: the process has ended.
+        """
+        process = self._process
+        if process is None or process.stdin is None:
+            raise PeerClosed(CLOSED)
+        try:
+            process.stdin.write(data)
+            await process.stdin.drain()
+        except OSError as fault:
+            raise PeerClosed(self._why()) from fault
+
+    async def unit(self) -> bytes:
+        """Return the next access unit; raise `PeerClosed` at the end or after too long a pause."""
+        limit_s = SILENCE_S if self._has_unit else FIRST_S
+        try:
+            async with asyncio.timeout(limit_s):
+                await self._started.wait()
+                record = await self._record()
+        except TimeoutError as fault:
+            raise PeerClosed(f"{self._address} sent no image for {limit_s:g} s") from fault
+        self._has_unit = True
+        return record
+
+    async def _record(self) -> bytes:
+        process = self._process
+        if process is None or process.stdout is None:
+            raise PeerClosed(self._why())
+        try:
+            head = await process.stdout.readexactly(RECORD.size)
+            size, kind = RECORD.unpack(head)
+            if size > _MOST_BYTES:
+                raise PeerClosed("the video library's process sent an invalid record")
+            content = await process.stdout.readexactly(size)
+        except (asyncio.IncompleteReadError, OSError) as fault:
+            raise PeerClosed(self._why()) from fault
+        if kind == FAULT:
+            raise PeerClosed(self._why(one_line(content.decode("utf-8", "replace"), 300)))
+        return content
+
+    def _why(self, said: str = "") -> str:
+        """Return why the connection ended; the network's reason comes first."""
+        relay = self._relay.fault if self._relay is not None else ""
+        fallback = "the process that reads the camera's stream has ended"
+        return self._reason or relay or said or fallback
+
+    async def _fed(self, source: Coroutine[Any, Any, None]) -> None:
+        try:
+            await source
+            self._reason = self._reason or "the camera ended the stream"
+        except TransportError as fault:
+            self._reason = self._reason or str(fault)
+        except Exception as bug:  # supervisor: the connection ends with a reason
+            log.error("the stream of %s failed", self._address, exc_info=bug)
+            self._reason = f"the stream failed ({type(bug).__name__}: {bug})"
+        self._kill()
+        self._started.set()
+
+    def _kill(self) -> None:
+        if self._process is not None and self._process.returncode is None:
+            with suppress(ProcessLookupError):
+                self._process.kill()
+
+    async def close(self) -> None:
+        """End the process and the connection immediately. The method never raises."""
+        self._reason = self._reason or CLOSED
+        self._kill()
+        if self._feeding is not None:
+            self._feeding.cancel()
+            await asyncio.gather(self._feeding, return_exceptions=True)
+        self._kill()  # the task may have started the process meanwhile
+        if self._relay is not None:
+            await self._relay.close()
+        if self._process is not None:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(1.0):
+                    await self._process.wait()
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+
+
+async def _connected(options: CameraOptions, timeout_s: float) -> _CameraConnection:
+    """Return an open connection within `timeout_s` seconds, or raise `ConnectFailed`."""
+    connection = _CameraConnection(options.address)
+    start = {"rtsp": _start_rtsp, "http": _start_http, "udp": _start_udp}[options.scheme]
+    try:
+        await start(connection, options, timeout_s)
+    except BaseException:
+        await connection.close()
+        raise
+    return connection
+
+
+async def _start_rtsp(
+    connection: _CameraConnection, options: CameraOptions, timeout_s: float
+) -> None:
+    place, login = options.place, options.credentials
+    dialer = StreamDialer(place.host, place.port, tls=options.tls)
+    stream = await dialer.open(timeout_s)
+    refuses_basic = login is not None and login.kind == "digest"
+    relay = RtspRelay(stream, RtspWatch(refuses_basic=refuses_basic))
+    try:
+        port = relay.listen()
+    except TransportError:
+        await relay.close()
+        raise
+    user = f"{quote(login.user, safe='')}:{quote(login.secret, safe='')}@" if login else ""
+    url = f"rtsp://{user}127.0.0.1:{port}{place.path}"
+    await connection.use_relay(relay, DemuxJob(url, "", options.over))
+
+
+async def _start_http(
+    connection: _CameraConnection, options: CameraOptions, timeout_s: float
+) -> None:
+    place = options.place._replace(path="/")
+    client = HttpClient(
+        place,
+        Dialer(place, tls=options.tls, tunnel=None),
+        credentials=options.credentials,
+        headers={},
+        connections=2,
+    )
+    try:
+        await client.reach(timeout_s)
+    except BaseException:
+        await client.close()
+        raise
+
+    async def read() -> None:
+        try:
+            request = client.follow("GET", options.place.path, {}, None)
+            async with client.answer(request, SILENCE_S) as response:
+                if fault := await fault_of(response):
+                    raise PeerClosed(fault)
+                await connection.start(DemuxJob())
+                async for piece in response.aiter_raw():
+                    await connection.write(piece)
+        finally:
+            await client.close()
+
+    connection.feed(read())
+
+
+async def _start_udp(
+    connection: _CameraConnection, options: CameraOptions, timeout_s: float
+) -> None:
+    place = options.place
+    line = UdpTransport(
+        options.sender, listen=place.port, bind=place.host, accepts_any=not options.sender
+    )
+
+    async def read() -> None:
+        try:
+            data = await line.receive()
+            is_ts = len(data) % _TS_PACKET == 0 and data[0] == _TS_SYNC
+            # A stream without a container begins with a NAL unit; H.265 has longer headers.
+            await connection.start(DemuxJob(format="mpegts" if is_ts else "h264"))
+            while True:
+                await connection.write(data)
+                data = await line.receive()
+        finally:
+            await line.close()
+
+    if options.sender:
+        await line.open(timeout_s)
+        connection.feed(read())
+        return
+
+    async def listen() -> None:
+        await line.open(FIRST_S)
+        await read()
+
+    connection.feed(listen())

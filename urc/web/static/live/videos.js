@@ -1,0 +1,128 @@
+// @ts-check
+/**
+ * The page's videos: access units go to a worker, and decoded images come back into the store.
+ *
+ * Browsers decode videos only on pages over HTTPS or on localhost. On other pages, and for codecs that the
+ * browser lacks, the page requests JPEG images instead.
+ */
+import { scriptUrl } from "../core/trusted_scripts.js";
+
+/** Number of faults of a video after which the page requests JPEG images. */
+const MOST_FAULTS = 3;
+/** Number of images in sequence after which earlier faults no longer count: datagrams may be lost at any time. */
+const FORGIVEN_AFTER = 100;
+/** Number of access units by which an image may leave the decoder early: a camera with B-frames reorders images. */
+const MOST_REORDERED = 16;
+/** Maximum number of access units without an image; the browser then decodes too slowly, or not at all. */
+const MOST_TIMES = 2000;
+
+export class Videos {
+  /**
+   * @param {import("./store.js").Store} store
+   * @param {() => void} changed called for each new image
+   * @param {() => void} refused called for each video that the page cannot decode
+   * @param {() => Worker} [start]
+   */
+  constructor(store, changed, refused, start = () => new Worker(scriptUrl("video"))) {
+    this.store = store;
+    this.changed = changed;
+    this.refused = refused;
+    this.start = start;
+    this.canDecode = isSecureContext && typeof VideoDecoder === "function";
+    /** @type {Worker | null} */
+    this.worker = null;
+    /** Time of each access unit in the decoder, by signal and number. @type {Map<string, Map<number, number>>} */
+    this.times = new Map();
+    /** Faults of each video, and the images since the last one. @type {Map<string, {count: number, images: number}>} */
+    this.faults = new Map();
+    /** Videos that the page cannot decode. @type {Set<string>} */
+    this.stills = new Set();
+  }
+
+  /**
+   * @param {import("./frames.js").BinaryFrame} frame
+   * @param {number} nowMs
+   */
+  take(frame, nowMs) {
+    const { video } = frame;
+    const timeMs = this.store.timeOf(frame, nowMs);
+    const signal = this.store.names[frame.index];
+    if (!video || signal === undefined || this.stills.has(signal)) return;
+    const times = this.times.get(signal) ?? new Map();
+    this.times.set(signal, times);
+    if (times.size >= MOST_TIMES) times.clear();
+    times.set(video.number, timeMs);
+    const data = frame.bytes.slice().buffer;
+    this.decoder().postMessage({ signal, number: video.number, isKey: video.isKey, codec: frame.type, data }, [data]);
+  }
+
+  /** Return the names of the shown videos that the page cannot decode. @param {readonly string[]} shown */
+  undecoded(shown) {
+    const videos = shown.filter((name) => this.store.signals.get(name)?.type === "video");
+    return this.canDecode ? videos.filter((name) => this.stills.has(name)) : videos;
+  }
+
+  /** End all videos that are not shown. @param {readonly string[]} shown */
+  keep(shown) {
+    for (const signal of this.times.keys()) {
+      if (shown.includes(signal) && !this.stills.has(signal)) continue;
+      this.times.delete(signal);
+      this.worker?.postMessage({ signal, isOver: true });
+    }
+  }
+
+  decoder() {
+    if (this.worker) return this.worker;
+    const worker = this.start();
+    worker.addEventListener("message", ({ data }) => this.answer(data));
+    worker.addEventListener("error", () => this.giveUp());
+    this.worker = worker;
+    return worker;
+  }
+
+  /** @param {{signal: string, number?: number, bitmap?: ImageBitmap, fault?: string}} told */
+  answer({ signal, number, bitmap, fault }) {
+    if (fault !== undefined) {
+      this.fail(signal, fault);
+      return;
+    }
+    const times = this.times.get(signal);
+    const timeMs = times?.get(number ?? -1);
+    if (!bitmap) return;
+    if (timeMs === undefined) {
+      bitmap.close();
+      return;
+    }
+    times?.delete(number ?? -1);
+    for (const known of times?.keys() ?? []) {
+      if (known > (number ?? 0) - MOST_REORDERED) break;
+      times?.delete(known);
+    }
+    const faults = this.faults.get(signal);
+    if (faults && (faults.images += 1) >= FORGIVEN_AFTER) this.faults.delete(signal);
+    this.store.videoImage(signal, bitmap, timeMs);
+    this.changed();
+  }
+
+  /**
+   * @param {string} signal
+   * @param {string} fault
+   */
+  fail(signal, fault) {
+    const count = (this.faults.get(signal)?.count ?? 0) + 1;
+    this.faults.set(signal, { count, images: 0 });
+    console.info(`URC: the video ${signal} cannot be decoded:`, fault);
+    if (count < MOST_FAULTS && !/^[a-z0-9.]+$/i.test(fault)) return;
+    this.stills.add(signal);
+    this.refused();
+  }
+
+  /** Request JPEG images for all videos, because the worker does not run. */
+  giveUp() {
+    this.canDecode = false;
+    this.worker?.terminate();
+    this.worker = null;
+    this.times.clear();
+    this.refused();
+  }
+}
