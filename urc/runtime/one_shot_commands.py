@@ -251,10 +251,8 @@ class OneShotCommands:
             await session.command(command, {}, on_sent=sent.append)
         except CommandFailed as failed:
             outcome = f"{failed.code}: {failed.message}"
-            # A refusal proves that the robot received the command. A reset ends the retries.
-            is_heard = failed.code == "refused" or (
-                bool(sent) and not self._controller().lease.latched
-            )
+            # A refused stop is repeated, too: the robot may go on. A reset ends the retries.
+            is_heard = bool(sent) and not self._controller().lease.latched
         if sent:
             self._recorder.ran(_STOP, command, {}, outcome, sent[-1])
         last = sent[-1] if sent else None

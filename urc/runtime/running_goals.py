@@ -18,7 +18,8 @@ from urc.model.values import NOTHING, Reading
 __all__ = ["MAX_GOALS", "RunningGoal", "RunningGoals", "action_of", "places_of"]
 
 MAX_GOALS: Final = 16
-"""Maximum number of goals of one robot; above it, the oldest is dropped."""
+"""Maximum number of goals of one robot; above it, the oldest is dropped, and
+lost ones first."""
 MAX_NUMBERS: Final = 1200
 """Maximum number of numbers in the arguments of a goal; longer arguments are left out."""
 
@@ -56,7 +57,8 @@ class RunningGoals:
     def begin(self, goal: RunningGoal) -> int:
         """Add a goal and return its number."""
         while len(self._goals) >= MAX_GOALS:
-            del self._goals[next(iter(self._goals))]
+            lost = (number for number, one in self._goals.items() if one.is_lost)
+            del self._goals[next(lost, next(iter(self._goals)))]
         self._count += 1
         self._goals[self._count] = goal._replace(number=self._count)
         return self._count

@@ -37,7 +37,7 @@ def test_every_choice_of_parts_is_a_valid_profile(
     known = checked.profile.settings
     assert settings_of(base(parts, version)).keys() <= known.keys()
     assert checked.profile.title == base().title
-    usual = "/camera/image_raw/compressed"
+    usual = "camera/image_raw/compressed"
     assert known["camera"].default == (usual if "camera" in parts else "")
 
 

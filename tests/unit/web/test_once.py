@@ -12,6 +12,7 @@ from urc.model.sequence import WaitStep
 from urc.protocol.events import Replied
 from urc.runtime.motion_controller import MotionController
 from urc.runtime.one_shot_commands import OneShotCommands
+from urc.runtime.running_goals import MAX_GOALS, RunningGoal, RunningGoals
 from urc.runtime.session import CommandFailed
 from urc.testing.clock import settle
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -174,6 +175,33 @@ async def test_a_robot_with_a_stop_of_its_own_is_given_it_once_for_each_press() 
         assert ran == [("STOP", "halt", "done")] * 2
 
 
+async def test_a_robot_is_not_at_rest_while_it_may_follow_a_goal() -> None:
+    """New settings could lead STOP to another robot."""
+    async with scene(commands=FOLD | HALT) as it:
+        hub = it.robot.hub
+        number = hub.begin_goal(RunningGoal(0, "fold"))
+        hub.sent_goal(number, "/dock")
+        assert not it.service.is_at_rest
+        hub.end_goal(number, is_lost=True)
+        assert not it.service.is_at_rest, "its reply is lost, but the robot may go on"
+        it.line.say({"t": "stop"})
+        await it.clock.advance(2)
+        assert it.service.is_at_rest
+
+
+async def test_a_full_list_of_goals_drops_a_lost_one_first() -> None:
+    goals = RunningGoals()
+    first = goals.begin(RunningGoal(0, "fold"))
+    second = goals.begin(RunningGoal(0, "fold"))
+    goals.sent(second, "/dock")
+    goals.end(second, is_lost=True)
+    for _ in range(MAX_GOALS - 1):
+        goals.begin(RunningGoal(0, "fold"))
+    numbers = [one.number for one in goals]
+    assert first in numbers
+    assert second not in numbers
+
+
 GOALS = Envelope("cancel", {"action": "/dock"})
 ABANDON = {"abandon": Command("abandon", "wire", WriteSpec("json", {"verb": "cancel"}), stops=True)}
 
@@ -295,17 +323,20 @@ async def test_a_stop_that_did_not_reach_the_robot_is_given_until_it_does() -> N
         assert it.service.controls.controller.is_confirmed
 
 
-async def test_a_stop_that_the_robot_refuses_has_reached_it() -> None:
-    """An arm that plays nothing has nothing to stop."""
+async def test_a_stop_that_the_robot_refuses_is_repeated_and_not_confirmed() -> None:
+    """The robot may go on, as when another program owns its lease."""
     async with scene(commands=FOLD | HALT) as it:
 
         def refuse(name: str, arguments: object) -> dict[str, int]:
-            raise CommandFailed("refused", "Failed to execute: stop")
+            raise CommandFailed("refused", "the lease is owned by the tablet")
 
         it.robot.on_command = refuse  # type: ignore[assignment]
         it.line.say({"t": "stop"})
-        await it.clock.advance(5)
-        assert [name for name, _ in it.robot.commands] == ["halt"]
+        await it.clock.advance(1.5)
+        assert [name for name, _ in it.robot.commands] == ["halt"] * 2
+        assert not confirmed(it.line)
+        it.robot.on_command = lambda name, arguments: {}
+        await it.clock.advance(1.5)
         assert confirmed(it.line)
 
 

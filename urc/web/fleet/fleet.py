@@ -108,8 +108,9 @@ class Fleet:
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
 
-        A pending stop counts as driving while a session can deliver it. Without a session, a
-        pending stop does not count, so that a wrong robot address can still be corrected.
+        A running goal counts as driving: with other settings, STOP would not reach it. A pending
+        stop counts while a session can deliver it. Without a session, it does not count, so that
+        a wrong robot address can still be corrected.
         """
         service = self.services.get(name)
         if service is None or service.is_at_rest:
@@ -117,6 +118,8 @@ class Fleet:
         holder = service.controls.controller.lease.state.holder
         if holder is not None:
             return holder.name
+        if service.has_goal:
+            return t("a running goal")
         return t("a pending stop") if service.is_open else ""
 
     def is_out_of_reach(self, name: str) -> bool:

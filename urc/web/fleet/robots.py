@@ -349,10 +349,17 @@ class RobotService:
         return {"holder": holder, "latched": state.latched_by, "emulated": is_emulated}
 
     @property
+    def has_goal(self) -> bool:
+        """Whether the robot follows a goal, or may follow a lost one."""
+        live = self.open_session
+        return live is not None and any(live.session.hub.goals)
+
+    @property
     def is_at_rest(self) -> bool:
-        """Whether no operator drives the robot and the robot has received every stop."""
+        """Whether no one drives the robot, it has received every stop, and it follows no goal."""
         controller = self.controls.controller
-        return controller.lease.state.holder is None and not controller.is_stop_due
+        is_free = controller.lease.state.holder is None and not controller.is_stop_due
+        return is_free and not self.has_goal
 
     @property
     def is_open(self) -> bool:
