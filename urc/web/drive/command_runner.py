@@ -6,10 +6,11 @@ exactly one outcome and one audit log entry.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
+from urc.guard.goal_reports import GoalReports
 from urc.model.payload import Payload
 from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Replied
@@ -18,6 +19,7 @@ from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
 from urc.runtime.one_shot_commands import (
+    LOOK_S,
     OUT_OF_SCOPE,
     CommandRefused,
     role_refusal,
@@ -33,8 +35,11 @@ __all__ = ["COMMAND_TIMEOUT_S", "CommandOutcome", "CommandRunner", "CommandTarge
 
 COMMAND_TIMEOUT_S: Final = 30.0
 """Longest wait for the reply to a command that does not declare a longer one, in seconds."""
+SETTLE_S: Final = 60.0
+"""Longest wait for the answer to a cancellation, in seconds."""
 LOST: Final = ("disconnected", "timed-out", "stopped")
 """Codes of failures after which a robot may still be on its way to a goal."""
+_Result = TypeVar("_Result")
 NOT_AWAITED: Final = "the page or program that sent the command no longer waits for its reply"
 
 
@@ -44,6 +49,10 @@ class CommandTarget(Protocol):
     @property
     def hub(self) -> Hub:
         """The hub with the values that all pages see."""
+
+    @property
+    def goals(self) -> GoalReports:
+        """The transports' reports about goals."""
 
     async def command(
         self,
@@ -79,8 +88,8 @@ class CommandRunner:
         self._controls = controls
         self._consent = consent
         self._clock = clock
-        self._followed: set[asyncio.Task[Replied | CommandFailed]] = set()
-        """Commands with autonomous motion that have not ended."""
+        self._followed: set[asyncio.Task[Any]] = set()
+        """Commands with autonomous motion, and cancellations, that have not ended."""
 
     async def run(
         self,
@@ -173,6 +182,7 @@ class CommandRunner:
         """
         known = self._controls.once.driver.commands.get(asked.command)
         if known is None or not starts_motion(known, asked.arguments):
+            since = target.goals.number
             replied = await target.command(
                 asked.command,
                 asked.arguments,
@@ -180,17 +190,33 @@ class CommandRunner:
                 on_sent=sent.append,
                 unless=unless,
             )
-            if action := action_of(_last(sent), "cancel"):
-                target.hub.settle_goals(action)
+            if known is not None and (action := action_of(_last(sent), "cancel")):
+                self._start(self._settle(target, known.transport, action, since))
             return replied
-        following = self._follow(operator, asked, target, people, sent, unless)
-        task = asyncio.create_task(following)
-        self._followed.add(task)
-        task.add_done_callback(self._followed.discard)
-        outcome = await asyncio.shield(task)
+        following = self._start(self._follow(operator, asked, target, people, sent, unless))
+        outcome = await asyncio.shield(following)
         if isinstance(outcome, CommandFailed):
             raise outcome
         return outcome
+
+    def _start(self, work: Coroutine[Any, Any, _Result]) -> asyncio.Task[_Result]:
+        """Run work until it ends, or until the session ends."""
+        task = asyncio.create_task(work)
+        self._followed.add(task)
+        task.add_done_callback(self._followed.discard)
+        return task
+
+    async def _settle(self, target: CommandTarget, line: str, action: str, since: int) -> None:
+        """Drop the lost goals of an action after the robot has answered their cancellation.
+
+        Without an answer in time, they stay until STOP or a later cancellation.
+        """
+        end_s = self._clock.now() + SETTLE_S
+        while self._clock.now() < end_s:
+            if target.goals.answer(line, action, since) == "answered":
+                target.hub.settle_goals(action)
+                return
+            await self._clock.sleep(LOOK_S)
 
     async def _follow(
         self,
