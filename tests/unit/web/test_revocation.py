@@ -7,6 +7,7 @@ import pytest
 from tests.unit.web.test_client import FakeLine
 from tests.unit.web.test_controls import Scene as ControlsScene
 from tests.unit.web.test_controls import scene as controls_scene
+from urc.guard.goal_reports import GoalReports
 from urc.model.driver import Command
 from urc.model.payload import WriteSpec
 from urc.model.role import Role
@@ -185,6 +186,8 @@ async def test_a_sequence_ends_with_the_right_of_its_operator(left: Role | None)
 
     class Target:
         """A session with a sequence that lasts until it is ended."""
+
+        goals = GoalReports(())
 
         async def command(self, name: str, *_: object, **__: object) -> Replied:
             started.set()

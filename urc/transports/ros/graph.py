@@ -74,8 +74,11 @@ class TopicGraph:
 
 
 def version_of(types: Iterable[str]) -> int | None:
-    """Return the ROS version (1 or 2) whose form the type names have; None without names."""
+    """Return the ROS version (1 or 2) whose form most type names have; None without names.
+
+    A bridge may also list the topics that URC itself has named, in the form of the driver.
+    """
     words = [len(name.split("/")) for name in types if name]
     if not words:
         return None
-    return 2 if 3 in words else 1
+    return 2 if 2 * words.count(3) >= len(words) else 1
