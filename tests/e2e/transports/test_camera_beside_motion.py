@@ -64,6 +64,13 @@ class Cart:
                 self.heard.append((asyncio.get_running_loop().time(), line.decode().strip()))
         writer.close()
 
+    async def close(self) -> None:
+        """Close the lines, which the end of the test would leave open."""
+        for writer in self.writers:
+            writer.close()
+            with suppress(ConnectionError):
+                await writer.wait_closed()
+
     async def until(self, count: int, word: str) -> None:
         """Wait for a word after the first `count` ones."""
         async with asyncio.timeout(WAIT_S):
@@ -115,6 +122,7 @@ async def scene(folder: Path) -> AsyncIterator[Scene]:
         it = Scene(cart, robot, film)
         await it.pictures()
         yield it
+    await cart.close()
 
 
 async def test_the_guard_has_no_camera_and_the_robot_stops_beside_one(tmp_path: Path) -> None:
