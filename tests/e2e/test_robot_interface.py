@@ -131,7 +131,7 @@ async def test_every_line_of_the_log_arrives(pair: Pair) -> None:
     cart.cut()
     async with asyncio.timeout(5):
         entry = await anext(lines)
-    assert entry.source == "wire"
+    assert entry.source == "transport wire"
     assert entry.level in ("warning", "error")
 
 

@@ -149,7 +149,9 @@ async def test_a_lease_ends_in_real_time_whatever_the_clock_does(file: Path, clo
                 pass
             assert _heard(rover)[-1][0] == 0
             if clock == "paused":
-                assert {sec for _, sec in _heard(rover)} == {1000}
+                # A connection that a busy machine had to open again begins at zero.
+                assert 1000 in (seconds := {sec for _, sec in _heard(rover)})
+                assert seconds <= {0, 1000}
             if clock == "none":
                 assert {sec for _, sec in _heard(rover)} == {0}
     finally:
