@@ -13,6 +13,9 @@ CONTRAST = "color-contrast"
 
 _RUN = """
 async (rules) => {
+  // A colour between two themes is none of either.
+  const fades = document.getAnimations().filter((one) => one instanceof CSSTransition);
+  await Promise.allSettled(fades.map((one) => one.finished));
   const found = await axe.run(document, {
     runOnly: rules.length > 0
       ? { type: "rule", values: rules }
