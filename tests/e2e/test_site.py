@@ -194,7 +194,7 @@ def test_each_whole_document_has_the_mark_of_the_playground(html: Path) -> None:
 async def test_questions_find_their_page_among_the_first_three(page: Page, address: str) -> None:
     """By the search of the site itself, in a browser."""
     await page.goto(f"{address}/search.html")
-    await page.wait_for_function("Search.hasIndex()")
+    await page.wait_for_function("() => Search.hasIndex()")
     found: dict[str, list[str]] = await page.evaluate(
         """([questions, first]) => Object.fromEntries(questions.map((question) => {
           const results = Search._performSearch(...Search._parseQuery(question));
