@@ -57,11 +57,13 @@ class Playground:
         self._service: RobotService | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
-    def open(self, text: str) -> str:
+    def open(self, text: str) -> str | None:
         """Load a document as the robot, in place of an earlier one; return its name.
 
+        Nothing is replaced while the earlier robot is not at rest: the result is then None.
+
         Raises:
-            UrcError: the document has errors, or an operator drives the robot.
+            UrcError: the document has errors.
         """
         robot = self._robot(text)
         service = self._service
@@ -71,7 +73,7 @@ class Playground:
         elif service.is_at_rest:
             service.replace(robot)
         else:
-            raise UrcError("the robot moves: let go of its controls first")
+            return None
         return robot.profile.name
 
     def page(self, query: str) -> str:

@@ -10,6 +10,8 @@ import { fragmentOf, textOf } from "./text_link.js";
 
 /** Time limit of a request to the robot; the longest one loads a document. */
 const WITHIN_MS = 30_000;
+/** Pause between two attempts to replace a robot that is not at rest. */
+const REST_MS = 300;
 /** Pause before the files are kept, so that the first picture of the robot comes first. */
 const KEEP_AFTER_MS = 3000;
 const FIRST = "dash/robots/turtlebot4.yaml";
@@ -145,11 +147,19 @@ async function start() {
   }
 }
 
-/** @param {string} text */
+/**
+ * Load a text as the robot.
+ *
+ * @param {string} text
+ * @returns {Promise<boolean>} whether the robot was at rest, so that the text could replace it
+ */
 async function open(text) {
-  robot = await ask({ verb: "open", text });
+  const name = await ask({ verb: "open", text });
+  if (!name) return false;
+  robot = name;
   running = text;
   tellRunning();
+  return true;
 }
 
 function tellRunning() {
@@ -162,7 +172,11 @@ async function reopen() {
   isOpening = true;
   try {
     while (frame && wanted !== running) {
-      await open(wanted);
+      if (!(await open(wanted))) {
+        tell("The new text waits until no one drives the robot.");
+        await new Promise((done) => setTimeout(done, REST_MS));
+        continue;
+      }
       early = null;
       frame.contentWindow?.location.replace(new URL("frame.html", import.meta.url));
     }

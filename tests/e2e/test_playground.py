@@ -145,6 +145,28 @@ async def test_an_edit_changes_the_robot_and_an_error_does_not(page: Page) -> No
     await expect(title).to_have_text("Edited robot")
 
 
+async def test_an_edit_waits_until_the_robot_is_at_rest(page: Page) -> None:
+    """A robot is never replaced under a hand; the newest text follows without another edit."""
+    frame = page.frame_locator("iframe")
+    title = frame.locator(".urc-bar-title")
+    area = page.locator("textarea")
+    text = await area.input_value()
+    pad = await frame.locator(".joystick-pad").bounding_box()
+    assert pad is not None
+    await page.mouse.move(pad["x"] + pad["width"] / 2, pad["y"] + pad["height"] / 2)
+    await page.mouse.down()
+    await area.evaluate(
+        "(area, text) => { area.value = text; area.dispatchEvent(new Event('input')); }",
+        text.replace("title: TurtleBot 4\n", "title: Waiting robot\n", 1),
+    )
+    await expect(page.locator("[data-state]").first).to_have_text(
+        "The new text waits until no one drives the robot.", timeout=WITHIN_MS
+    )
+    await expect(title).to_have_text("TurtleBot 4")
+    await page.mouse.up()
+    await expect(title).to_have_text("Waiting robot", timeout=WITHIN_MS)
+
+
 async def test_lines_stay_next_to_their_numbers(page: Page) -> None:
     """The text area has all its lines in sight, so it never scrolls within its frame."""
     heights = await page.evaluate(
