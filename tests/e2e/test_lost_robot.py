@@ -106,7 +106,9 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
             await expect(page.locator(CARD)).to_be_visible()
             await expect(page.locator("[data-lost-age]")).to_have_text("Last picture: 2 min ago")
             await until_attribute(page, GROUND_CELL, "data-old", "2 min old")
-            await page.wait_for_function("() => document.querySelector('.camera-picture').width === 8")
+            await page.wait_for_function(
+                "() => document.querySelector('.camera-picture').width === 8"
+            )
             look = await page.evaluate(OF_PICTURE)
             assert look["visibility"] == "visible"
             assert "grayscale(1)" in look["filter"]
