@@ -310,6 +310,35 @@ async def test_the_cancellation_of_all_goals_is_repeated_until_the_robot_answers
             assert len(robot.requests) == count
 
 
+async def test_a_reply_without_goals_is_no_answer_while_another_programs_goal_goes_on(
+    tmp_path: Path,
+) -> None:
+    """rclpy reports a refusal as success without goals; only the status shows the goal."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER)
+    rover = load_profile(path, built_in_catalog())
+    goal = {"op": "send_action_goal", "id": "g1", "action": "/dock", "action_type": "a/Dock"}
+    async with nothing_left(), emulated(rover) as port, cancel_service(port) as robot:
+        await robot.reply({"return_code": 0, "goals_canceling": []})
+        settings = {"host": "127.0.0.1", "port": port}
+        transports = built_in_catalog().transports
+        async with (
+            connect(f"ws://127.0.0.1:{port}") as other,
+            Session(rover, settings, transports) as session,
+        ):
+            await other.send(json.dumps({**goal, "args": {}}))
+            await until(session, lambda: value(session, "going") is True)
+            since = session.goals.number
+            await session.command("stop_docking", {})
+            await robot.asked(2)
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            assert any("still follows a goal" in note.text for note in session.hub.notes)
+            await other.send(
+                json.dumps({"op": "cancel_action_goal", "id": "g1", "action": "/dock"})
+            )
+            await answered(session, since)
+
+
 async def test_a_cancellation_without_an_answer_delays_neither_stops_nor_a_new_goal(
     tmp_path: Path,
 ) -> None:
@@ -388,6 +417,30 @@ async def test_the_emulated_bridge_ends_the_goals_of_all_clients_for_a_zero_id_o
             assert (result["op"], result["id"], result["status"]) == ("action_result", "g1", 5)
             await other.send(json.dumps({**call, "service": "/fly/_action/cancel_goal"}))
             assert json.loads(await other.recv())["result"] is False
+
+
+async def test_the_emulated_bridge_latches_the_states_of_an_actions_goals(tmp_path: Path) -> None:
+    path = tmp_path / "rover.yaml"
+    path.write_text(DOCKER)
+    goal = {"op": "send_action_goal", "id": "g1", "action": "/dock", "action_type": "a/Dock"}
+    listen = {"op": "subscribe", "topic": "/dock/_action/status", "type": "a/GoalStatusArray"}
+    async with nothing_left(), emulated(load_profile(path, built_in_catalog())) as port:
+        url = f"ws://127.0.0.1:{port}"
+        async with connect(url) as one, connect(url) as other, asyncio.timeout(WAIT_S):
+
+            async def states() -> list[int]:
+                said = json.loads(await other.recv())
+                assert said["topic"] == "/dock/_action/status"
+                return [each["status"] for each in said["msg"]["status_list"]]
+
+            await other.send(json.dumps(listen))
+            assert await states() == []
+            await one.send(json.dumps({**goal, "args": {}}))
+            assert await states() == [2]
+            await other.send(json.dumps(listen))
+            assert await states() == [2]
+            await one.send(json.dumps({"op": "cancel_action_goal", "id": "g1", "action": "/dock"}))
+            assert await states() == []
 
 
 async def test_the_emulated_bridge_takes_a_cancel_from_any_client_but_no_unknown_id(

@@ -17,7 +17,7 @@ from urc.model.values import NOTHING
 from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
-from urc.transports.ros.rosbridge_cancellations import CANCEL_GOAL
+from urc.transports.ros.rosbridge_cancellations import CANCEL_GOAL, STATUS
 from urc.transports.ros.types import spelled
 
 __all__ = ["RosbridgeServer"]
@@ -27,8 +27,8 @@ MAX_TOPICS = 512
 """Maximum number of topics, services and subscriptions per client."""
 _ENDS = {True: 4, False: 6}
 """Status codes of action results: succeeded or aborted."""
-_CANCELLED = 5
-"""Status code of a cancelled goal (action_msgs/GoalStatus)."""
+_EXECUTING, _CANCELLED = 2, 5
+"""Status codes of a running and of a cancelled goal (action_msgs/GoalStatus)."""
 _UNKNOWN_GOAL = 2
 """Return code of a cancellation of an unknown goal (action_msgs/CancelGoal)."""
 
@@ -93,8 +93,37 @@ class Bridge:
     def add_goal(self, number: str | int, sender: "BridgeClient", action: str) -> None:
         """Keep a running goal; above the limit, drop the oldest."""
         while len(self.goals) >= MAX_TOPICS:
-            del self.goals[next(iter(self.goals))]
+            self.remove_goal(next(iter(self.goals)))
         self.goals[number] = sender, action
+        self._show_status(action)
+
+    def remove_goal(self, number: str | int) -> tuple["BridgeClient", str]:
+        """Remove a goal that has ended; return its sender and action."""
+        sender, action = self.goals.pop(number)
+        self._show_status(action)
+        return sender, action
+
+    def running(self, action: str) -> list[dict[str, object]]:
+        """Return the running goals of an action, as in action_msgs/GoalInfo."""
+        goals = [goal for goal, (_, name) in self.goals.items() if name == action]
+        ids = [hashlib.blake2b(str(goal).encode(), digest_size=16).digest() for goal in goals]
+        stamp = {"sec": 0, "nanosec": 0}
+        return [{"goal_id": {"uuid": list(one)}, "stamp": stamp} for one in ids]
+
+    def status(self, topic: str) -> dict[str, object] | None:
+        """Return the states of the goals (action_msgs/GoalStatusArray); None for other topics."""
+        action = topic.removesuffix(STATUS)
+        if action == topic or action not in self.actions:
+            return None
+        running = self.running(action)
+        return {"status_list": [{"goal_info": one, "status": _EXECUTING} for one in running]}
+
+    def _show_status(self, action: str) -> None:
+        topic = action + STATUS
+        said = self.status(topic)
+        for client in self.clients if said is not None else ():
+            if topic in client.wanted:
+                client.write({"op": "publish", "topic": topic, "msg": said})
 
     def publish(self, topic: str, message: object, now_s: float) -> None:
         """Send a message to every subscriber."""
@@ -173,7 +202,7 @@ class BridgeClient:
         if sender is not self:
             return ""
         if ends:
-            del self._bridge.goals[number]
+            self._bridge.remove_goal(number)
         return action
 
     def show(self, topic: str, message: object, now_s: float) -> None:
@@ -254,13 +283,17 @@ class BridgeClient:
         topic = _text(operation, "topic")
         if not topic or len(self.wanted) >= MAX_TOPICS:
             return
-        self._learn(topic, operation)
+        status = self._bridge.status(topic)
+        if status is None:
+            self._learn(topic, operation)
         throttle_ms, fragment = operation.get("throttle_rate"), operation.get("fragment_size")
         self.wanted[topic] = _Wanted(
             max(0, throttle_ms) / 1000 if isinstance(throttle_ms, int | float) else 0.0,
             str(operation.get("compression") or "none"),
             max(0, fragment) if isinstance(fragment, int) else 0,
         )
+        if status is not None:  # latched
+            self.write({"op": "publish", "topic": topic, "msg": status})
 
     def unsubscribe(self, operation: Mapping[str, Any], now_s: float) -> None:
         """Forget a subscription."""
@@ -353,18 +386,15 @@ class BridgeClient:
                 service, number, {"return_code": _UNKNOWN_GOAL, "goals_canceling": []}, True
             )
             return None
-        goals = [goal for goal, (_, name) in bridge.goals.items() if name == action]
-        for goal in goals:
+        listed = bridge.running(action)
+        for goal in [goal for goal, (_, name) in bridge.goals.items() if name == action]:
             self._end(action, goal)
-        stamp = {"sec": 0, "nanosec": 0}
-        ids = [list(hashlib.blake2b(str(goal).encode(), digest_size=16).digest()) for goal in goals]
-        listed = [{"goal_id": {"uuid": one}, "stamp": stamp} for one in ids]
         self.answer(service, number, {"return_code": 0, "goals_canceling": listed}, True)
         return Envelope("cancel", {"action": action})
 
     def _end(self, action: str, number: str | int) -> None:
         """End a goal as cancelled, and send the result to the goal's sender if it is connected."""
-        sender, _ = self._bridge.goals.pop(number)
+        sender, _ = self._bridge.remove_goal(number)
         if sender in self._bridge.clients:
             sender.write(
                 {
@@ -412,7 +442,8 @@ class BridgeClient:
                 return {"subscribers": nodes}
             case "publishers":
                 topic = str(given.get("topic"))
-                return {"publishers": ["/robot"] if topic in self._bridge.declared else []}
+                is_known = topic in self._bridge.declared or self._bridge.status(topic) is not None
+                return {"publishers": ["/robot"] if is_known else []}
             case "services":
                 return {"services": sorted(self._bridge.servers)}
         return None

@@ -13,7 +13,13 @@ An attempt is repeated after 1 s, 2 s, 4 s, 8 s and then every 10 s, without a l
 robot answers. A refusal, a failure and a missing reply are no answers. A new goal of the action
 ends the attempts, because they would also cancel the new goal.
 
-Sources: action_msgs/srv/CancelGoal; rosbridge protocol specification, ``call_service``.
+A reply does not prove that the goals end: rclpy reports a refusal as success without goals, and a
+goal can take long to end. An attempt therefore succeeds only after the topic `STATUS` of the action
+shows no active goal. An action that has never had a goal has no status. Its silence counts only if
+rosapi knows the topic's publisher, because a bridge can also withhold the topic.
+
+Sources: action_msgs/srv/CancelGoal; action_msgs/msg/GoalStatusArray; ROS 2 design, Actions;
+rosbridge protocol specification, ``call_service`` and ``subscribe``.
 """
 
 import asyncio
@@ -28,16 +34,25 @@ from urc.transports.base import TransportError
 from urc.transports.ros.goals import FIRST_S, longer
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader, encode_operation
 
-__all__ = ["CANCEL_GOAL", "CancelWire", "ActionCancellations"]
+__all__ = ["CANCEL_GOAL", "STATUS", "CancelWire", "ActionCancellations"]
 
 CANCEL_GOAL: Final = "/_action/cancel_goal"
 """End of the name of the service that cancels goals."""
+STATUS: Final = "/_action/status"
+"""End of the name of the topic with the states of an action's goals; the newest message is latched.
+"""
 ATTEMPT_S: Final = 5.0
-"""Time limit of one attempt, from connecting to the reply, in seconds."""
+"""Time limit of one attempt, from connecting to the end of all goals, in seconds."""
+SILENT_S: Final = 1.0
+"""Time within which the latched status arrives if there is one, in seconds."""
 MAX_AT_ONCE: Final = 8
 """Maximum number of simultaneous attempts; each one needs a connection."""
 _SHOWN: Final = 80
 _REJECTED, _TERMINATED = 1, 3
+_STATUS_TYPE: Final = "action_msgs/msg/GoalStatusArray"
+_ACTIVE: Final = (1, 2, 3)
+"""States of accepted, executing and canceling goals (action_msgs/msg/GoalStatus)."""
+_GOES_ON: Final = "the robot still follows a goal"
 
 
 class CancelWire(Protocol):
@@ -120,40 +135,112 @@ class ActionCancellations:
             wait_s = longer(wait_s)
 
     async def _attempt(self, action: str) -> str:
-        """Call the service over a new connection; return why the goals may go on, or ""."""
-        wire = self._wire()
+        """Cancel all goals over a new connection; return why the goals may go on, or ""."""
+        bridge = _Bridge(self._wire())
+        late = f"no reply within {ATTEMPT_S:g} s"
         try:
             async with asyncio.timeout(ATTEMPT_S):
-                await wire.open(ATTEMPT_S)
+                await bridge.open()
                 if not self._owes(action):
                     return ""
-                reply = await _call(wire, action + CANCEL_GOAL)
+                why_not, is_cancelling = _outcome(await bridge.call(action + CANCEL_GOAL, {}))
+                if why_not:
+                    return why_not
+                late = _GOES_ON
+                why_not = await _rest(bridge, action + STATUS, is_cancelling=is_cancelling)
         except TimeoutError:
-            return f"no reply within {ATTEMPT_S:g} s"
+            return late
         except TransportError as fault:
             return str(fault)
         finally:
-            await wire.abort()
-        why_not, is_cancelling = _outcome(reply)
-        if why_not:
-            return why_not
-        if self._answered(action, is_cancelling):
-            return ""
-        return "the robot still follows a goal"
+            await bridge.abort()
+        if not why_not and not self._answered(action, is_cancelling):
+            return _GOES_ON
+        return why_not
 
 
-async def _call(wire: CancelWire, service: str) -> Mapping[str, Any]:
-    """Call a service with an empty request, and return the response's operation."""
-    number = f"call_service:{service}:{secrets.token_hex(8)}"
-    call = {"op": "call_service", "id": number, "service": service, "args": {}}
-    await wire.send(encode_operation({**call, "timeout": ATTEMPT_S}))
-    reader = OperationReader()
-    while True:
-        frame = await wire.receive()
-        with suppress(BadOperation):  # of another client's topic, for example
-            said = reader.read(frame)
-            if said is not None and said["op"] == "service_response" and said.get("id") == number:
+class _Bridge:
+    """The connection of one attempt."""
+
+    def __init__(self, wire: CancelWire) -> None:
+        self._wire = wire
+        self._reader = OperationReader()
+
+    async def open(self) -> None:
+        """Connect, or raise `TransportError`."""
+        await self._wire.open(ATTEMPT_S)
+
+    async def abort(self) -> None:
+        """Close the connection immediately; never raises."""
+        await self._wire.abort()
+
+    async def call(self, service: str, arguments: Mapping[str, object]) -> Mapping[str, Any]:
+        """Call a service and return the response's operation."""
+        number = f"call_service:{service}:{secrets.token_hex(8)}"
+        call = {"op": "call_service", "id": number, "service": service, "args": arguments}
+        await self._wire.send(encode_operation({**call, "timeout": ATTEMPT_S}))
+        while True:
+            said = await self._next("service_response")
+            if said.get("id") == number:
                 return said
+
+    async def subscribe(self, topic: str, kind: str) -> None:
+        """Subscribe to a topic; a latched message arrives soon."""
+        await self._wire.send(encode_operation({"op": "subscribe", "topic": topic, "type": kind}))
+
+    async def message(self, topic: str) -> Any:
+        """Return the next message on a subscribed topic."""
+        while True:
+            said = await self._next("publish")
+            if said.get("topic") == topic:
+                return said.get("msg")
+
+    async def _next(self, operation: str) -> Mapping[str, Any]:
+        while True:
+            frame = await self._wire.receive()
+            with suppress(BadOperation):  # such frames prove nothing
+                said = self._reader.read(frame)
+                if said is not None and said["op"] == operation:
+                    return said
+
+
+async def _rest(bridge: _Bridge, topic: str, *, is_cancelling: bool) -> str:
+    """Wait until an action has no active goal; return why that cannot be seen, or "".
+
+    Args:
+        bridge: connection over which all goals of the action were cancelled.
+        topic: the topic with the states of the goals.
+        is_cancelling: whether the robot has listed goals that it now cancels. Such an action has a
+            status.
+    """
+    await bridge.subscribe(topic, _STATUS_TYPE)
+    try:
+        async with asyncio.timeout(SILENT_S):
+            said = await bridge.message(topic)
+    except TimeoutError:
+        is_shown = not is_cancelling and await _is_published(bridge, topic)
+        return "" if is_shown else f"the bridge does not show {one_line(topic)[:_SHOWN]}"
+    while _is_active(said):
+        said = await bridge.message(topic)
+    return ""
+
+
+async def _is_published(bridge: _Bridge, topic: str) -> bool:
+    """Return whether rosapi knows a publisher of a topic."""
+    said = await bridge.call("/rosapi/publishers", {"topic": topic})
+    values = said.get("values")
+    if said.get("result") is False or not isinstance(values, Mapping):
+        return False
+    return bool(values.get("publishers"))
+
+
+def _is_active(status: Any) -> bool:
+    """Return whether a status shows an active goal; an invalid status does not show the end."""
+    listed = status.get("status_list") if isinstance(status, Mapping) else None
+    if not isinstance(listed, list):
+        return True
+    states = [one.get("status") if isinstance(one, Mapping) else None for one in listed]
+    return any(not isinstance(one, int) or one in _ACTIVE for one in states)
 
 
 def _outcome(reply: Mapping[str, Any]) -> tuple[str, bool]:
