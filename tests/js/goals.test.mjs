@@ -141,3 +141,12 @@ test("a lost route of another page says so, and may be found again", () => {
   share(made, GOAL);
   assert.equal(made.active.isLost, false);
 });
+
+test("a lost goal hides no running one, and is shown again after it", () => {
+  const made = choice();
+  const running = { ...TRIP, number: 1, args: { x: 7, y: 8 } };
+  share(made, running, { ...TRIP, number: 2, isLost: true });
+  assert.deepEqual([made.trip.place, made.trip.isLost], [[8, 7], false]);
+  share(made, { ...TRIP, number: 2, isLost: true });
+  assert.deepEqual([made.trip.place, made.trip.isLost], [[2, 1], true]);
+});

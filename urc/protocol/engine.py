@@ -56,6 +56,7 @@ from urc.protocol.requests.exchange import (
     LineEvent,
     ReplySink,
 )
+from urc.protocol.requests.goal_watch import GoalWatch, OnGoal
 from urc.protocol.requests.reply_match import Matched
 from urc.protocol.requests.request_compiler import RequestCompiler
 from urc.protocol.schedule import PollSchedule
@@ -223,6 +224,7 @@ class Engine:
             now,
             confirmed_by=people,
             unless=request.unless,
+            on_goal=request.on_goal,
         )
         return self._settle(events, now)
 
@@ -289,11 +291,12 @@ class Engine:
         privileged_on: str = "",
         confirmed_by: tuple[str, ...] = (),
         unless: Unless | None = None,
+        on_goal: OnGoal | None = None,
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink` exactly once.
 
         If `unless` returns a reason at the time of sending, the command fails instead. In a
-        sequence, only goals are checked.
+        sequence, only goals are checked. `on_goal` is described in `Request`.
         """
         found = self._commands.get(command)
         if found is None:
@@ -310,11 +313,11 @@ class Engine:
                 return sink(refused, now)
         program = self.programs.get(command)
         if program is None:
-            return self._send(found, values, sink, now, privileged_on, unless)
+            return self._send(found, values, sink, now, privileged_on, unless, on_goal)
         if any(runner.program is program for runner in self._runners):
             return sink(ExchangeOutcome("at-work", f"{command} is already running"), now)
         runner = SequenceRunner(self, program, sink, privileged_on, confirmed_by)
-        runner.unless = unless
+        runner.unless, runner.on_goal = unless, on_goal
         runner.wait_for_logins(now)
         self._start_sequence(runner)
         return []
@@ -327,6 +330,7 @@ class Engine:
         now: float,
         on: str,
         unless: Unless | None,
+        on_goal: OnGoal | None,
     ) -> list[LineEvent]:
         if command.verify is not None and self._verifications.is_full:
             return sink(ExchangeOutcome("queue-full", "too many commands await verification"), now)
@@ -337,6 +341,8 @@ class Engine:
             return sink(ExchangeOutcome("bad-argument", str(error)), now)
         exchange.is_privileged = on == command.transport
         exchange.unless = unless
+        if on_goal is not None and command.send.options.get("verb") == GOAL:
+            exchange.goal = GoalWatch(on_goal)
         return self.lines[command.transport].submit(exchange, now)
 
     def _start_sequence(self, runner: SequenceRunner) -> None:
@@ -372,6 +378,8 @@ class Engine:
             told.append(event)  # type: ignore[arg-type]  # external events
         elif isinstance(event, ExchangeEnded):
             exchange, outcome = event
+            if exchange.goal is not None and exchange.ask.answers:
+                exchange.goal.ended(outcome.code)
             for one in exchange.owner.ended(exchange, outcome, now):
                 self._act(one, told, now)
         elif isinstance(event, Matched):

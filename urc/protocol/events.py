@@ -38,6 +38,9 @@ class Request(NamedTuple):
     unless: Callable[[], str] | None = None
     """Function that returns why the command may no longer start, or "". It is called when the frame
     leaves URC, because a command may wait in a queue and a goal may wait for its services."""
+    on_goal: Callable[[str, bool], None] | None = None
+    """Callback for the goals that the command sends. It receives the ROS action, and whether the
+    goal has ended. It is called when a goal is sent, and when the goal's end is known."""
 
 
 class Open(NamedTuple):

@@ -361,15 +361,27 @@ class Hub:
         self._goals_changed()
         return number
 
-    def sent_goal(self, number: int, action: str) -> None:
-        """Note the ROS action to which a goal was sent."""
-        self.goals.sent(number, action)
+    def share_goals(self, goals: RunningGoals) -> None:
+        """Use the goals of the robot's earlier sessions, which outlive this session."""
+        self.goals = goals
+        if any(goals):
+            self._goals_changed()
+
+    def sent_goal(self, number: int, action: str, *, is_over: bool = False) -> None:
+        """Note the ROS action to which a goal was sent, or that its goal has ended (`is_over`)."""
+        change = self.goals.over if is_over else self.goals.sent
+        change(number, action)
         self._goals_changed()
 
     def end_goal(self, number: int, *, is_lost: bool = False) -> None:
         """End a goal whose reply has arrived, or cannot arrive any more (`is_lost`)."""
         self.goals.end(number, is_lost=is_lost)
         self._goals_changed()
+
+    def dismiss_goal(self, number: int) -> None:
+        """Drop a lost goal that a person knows to have ended; ignore other goals."""
+        if self.goals.dismiss(number):
+            self._goals_changed()
 
     def settle_goals(self, action: str | None = None) -> None:
         """Drop lost goals: a cancellation of their action, or STOP (None), has ended them."""

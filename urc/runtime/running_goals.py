@@ -2,10 +2,12 @@
 
 Layer 4. Every page shows these goals, also a page that was opened later. A goal runs until the
 reply to its command. The reply to a ROS goal is lost with its connection, but the robot may go on.
-Such a goal is *lost*. It is kept until STOP or a cancellation has ended it, or until a newer goal
-replaces it.
+Such a goal is *lost*. It is kept until STOP or a cancellation has ended it, or until a person
+dismisses it. A newer goal does not end it, because not every robot ends a goal for the next one.
 
-After a restart of the server, no goal is known.
+A sequence may send several goals. It is lost with those whose end is not known.
+
+The goals outlive the robot's sessions. After a restart of the server, no goal is known.
 """
 
 import math
@@ -38,14 +40,16 @@ class RunningGoal(NamedTuple):
     """Identifier of the operator's page."""
     since_s: float = 0.0
     """Start, in seconds on the session's clock."""
-    action: str = ""
-    """ROS action of the goal; "" until the goal has been sent, and for other commands."""
+    actions: tuple[str, ...] = ()
+    """ROS actions of the goals that the command has sent and whose end is not known."""
     is_lost: bool = False
     """Whether the reply can't arrive any more, although the robot may go on."""
+    title: str = ""
+    """Title of the command; "" without one."""
 
 
 class RunningGoals:
-    """The goals of one session, oldest first."""
+    """The goals of one robot, oldest first."""
 
     def __init__(self) -> None:
         self._goals: dict[int, RunningGoal] = {}
@@ -64,25 +68,54 @@ class RunningGoals:
         return self._count
 
     def sent(self, number: int, action: str) -> None:
-        """Note the ROS action to which a goal was sent; lost goals of the action are replaced."""
-        self.settle(action)
-        if number in self._goals:
-            self._goals[number] = self._goals[number]._replace(action=action)
+        """Note the ROS action to which a goal was sent; ignore "" and unknown numbers."""
+        goal = self._goals.get(number)
+        if goal is not None and action and action not in goal.actions:
+            self._goals[number] = goal._replace(actions=(*goal.actions, action))
+
+    def over(self, number: int, action: str) -> None:
+        """Note that a goal of an action has ended, even if its command has ended before."""
+        goal = self._goals.get(number)
+        if goal is not None:
+            self._without(goal, action)
 
     def end(self, number: int, *, is_lost: bool = False) -> None:
         """End a goal; keep the goal of a ROS action whose reply is lost."""
-        goal = self._goals.pop(number, None)
-        if goal is not None and is_lost and goal.action:
+        goal = self._goals.get(number)
+        if goal is not None and is_lost and goal.actions:
             self._goals[number] = goal._replace(is_lost=True)
+        else:
+            self._goals.pop(number, None)
 
     def settle(self, action: str | None = None) -> bool:
         """Drop the lost goals of an action, or of all actions; return whether there were any."""
-        found = [
-            one.number for one in self if one.is_lost and (action is None or one.action == action)
-        ]
-        for number in found:
-            del self._goals[number]
+        found = [one for one in self if one.is_lost and (action is None or action in one.actions)]
+        for goal in found:
+            if action is None:
+                del self._goals[goal.number]
+            else:
+                self._without(goal, action)
         return bool(found)
+
+    def dismiss(self, number: int) -> bool:
+        """Drop a lost goal that a person knows to have ended; return whether it was lost."""
+        goal = self._goals.get(number)
+        if goal is None or not goal.is_lost:
+            return False
+        del self._goals[number]
+        return True
+
+    @property
+    def is_awaited(self) -> bool:
+        """Whether the reply of a goal can still arrive."""
+        return any(not one.is_lost for one in self)
+
+    def _without(self, goal: RunningGoal, action: str) -> None:
+        """Remove an action from a goal, and a lost goal after its last action."""
+        actions = tuple(one for one in goal.actions if one != action)
+        self._goals[goal.number] = goal._replace(actions=actions)
+        if goal.is_lost and not actions:
+            del self._goals[goal.number]
 
 
 def action_of(payload: Payload | None, verb: str) -> str:

@@ -285,6 +285,7 @@ class Session:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
+        on_goal: Callable[[str, bool], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; the wait always has a time limit.
 
@@ -297,6 +298,7 @@ class Session:
             on_sent: callback that receives each sent payload, except secrets and sequence payloads.
             unless: function that returns why the command may no longer start, or ""; called when
                 the frame leaves URC.
+            on_goal: callback for the goals that the command sends; see `Request.on_goal`.
 
         Raises:
             CommandFailed: the command was refused, timed out, or lost its connection.
@@ -305,7 +307,7 @@ class Session:
         if self._untried:
             await self._first_attempt(name, given)
         number = next(self._numbers)
-        request = new(Request, (number, name, given, confirmed_by, on_sent, unless))
+        request = new(Request, (number, name, given, confirmed_by, on_sent, unless, on_goal))
         try:
             outcome = await self._dispatcher.command(request)
         except asyncio.CancelledError:

@@ -173,6 +173,7 @@ class FakeRobot:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
+        on_goal: Callable[[str, bool], None] | None = None,
     ) -> Replied:
         """Record the command, report its sent frame, and return the test's reply."""
         if on_sent is not None:

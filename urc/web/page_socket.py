@@ -24,7 +24,7 @@ from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missi
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
 from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
-from urc.wire.client_messages import ImageSelection, Reconnect, ScreenName
+from urc.wire.client_messages import GoalDismissal, ImageSelection, Reconnect, ScreenName
 
 __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientSocket"]
 
@@ -296,6 +296,9 @@ class BrowserClient:
             live.fanout.show(self._place, asked.signals, asked.stills)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)
+        elif isinstance(asked, GoalDismissal):
+            if self._operator is not None:
+                self._service.commands.dismiss(self._operator, asked.goal, live.session.hub)
         elif isinstance(asked, ScreenName):
             if self._operator is not None:
                 self._service.controls.name_screen(self._operator, asked.name)

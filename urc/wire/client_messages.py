@@ -27,6 +27,7 @@ __all__ = [
     "Approval",
     "ApprovalRequest",
     "SequenceAction",
+    "GoalDismissal",
     "SCREEN_NAME_LENGTH",
     "ScreenName",
     "Reconnect",
@@ -112,6 +113,14 @@ class SequenceAction(
     verb: Pull
 
 
+class GoalDismissal(
+    msgspec.Struct, tag_field="t", tag="dismiss", forbid_unknown_fields=True, frozen=True
+):
+    """A person's statement that a lost goal, with the number in `GoalRow`, has ended."""
+
+    goal: int
+
+
 class ScreenName(
     msgspec.Struct, tag_field="t", tag="name", forbid_unknown_fields=True, frozen=True
 ):
@@ -193,6 +202,7 @@ ClientMessage = (
     | Approval
     | ApprovalRequest
     | SequenceAction
+    | GoalDismissal
     | ScreenName
     | Reconnect
     | Drive
@@ -209,6 +219,7 @@ RIGHTS: Final[Mapping[type, Role | None]] = {
     ApprovalRequest: "drive",
     Approval: "drive",
     SequenceAction: "drive",
+    GoalDismissal: "drive",
     ScreenName: "watch",
     Reconnect: "watch",
     Drive: "drive",

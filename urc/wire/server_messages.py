@@ -315,6 +315,8 @@ class GoalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     """Time since its start, in milliseconds."""
     lost: bool = False
     """Whether its reply can't arrive any more, although the robot may go on."""
+    title: str = ""
+    """Title of the command; "" without one."""
 
 
 class ProgressMessage(Outbound, tag="progress", omit_defaults=False, frozen=True):

@@ -175,8 +175,9 @@ export class Choice {
   get places() {
     if (this.mode === "place") return this.spot ? [this.spot] : [];
     if (this.mode !== "look") return this.route.places;
+    if (this.isTrip && this.trip) return [this.trip.place];
     if (this.active) return this.active.route.places.slice(this.active.at);
-    return this.kept?.places ?? (this.trip ? [this.trip.place] : []);
+    return this.kept?.places ?? [];
   }
 
   /** Directions to draw, for each place; [] without directions. @returns {readonly number[]} */
@@ -189,9 +190,10 @@ export class Choice {
     return this.kept ? this.directions(this.kept) : [];
   }
 
-  /** Whether the place that the robot is on its way to is shown. */
+  /** Whether the place that the robot is on its way to is shown: before kept and lost routes. */
   get isTrip() {
-    return this.mode === "look" && this.trip !== null && !this.active && !this.kept;
+    const { active, trip } = this;
+    return this.mode === "look" && trip !== null && (!active || (active.isLost && !trip.isLost));
   }
 
   /** @param {Route} route */
@@ -405,7 +407,7 @@ export class Choice {
     const isIdle = mode === "look" && !this.aiming;
     const isTrip = isIdle && this.isTrip;
     const isOther = this.isOther() && !this.isTrip;
-    const [active, kept] = [isIdle ? this.active : null, isIdle && !this.active && !isOther ? this.kept : null];
+    const [active, kept] = [isIdle && !isTrip ? this.active : null, isIdle && !this.active && !isOther ? this.kept : null];
     const isTurned = (mode === "place" && this.yaw !== null) || (mode === "way" && places.length > 0 && this.turns.has("waypoints"));
     const hide = (/** @type {Element} */ part, /** @type {boolean} */ isShown) => attribute(part, "hidden", isShown ? null : "");
     const disable = (/** @type {Element} */ part, /** @type {boolean} */ isOff) => attribute(part, "disabled", isOff ? "" : null);
@@ -472,7 +474,7 @@ export class Choice {
     const names = { count: places.length, length: distanceText(lengthOf(places, isLocal)) };
     if (mode === "sure") return t("Send the robot to {count} places in order ({length})?", names);
     if (mode === "look" && this.aiming) return t("Press on the place, and drag in the direction.");
-    if (mode === "look" && active) {
+    if (mode === "look" && active && !this.isTrip) {
       const way = { number: active.at + 1, count: active.route.size };
       const told = active.isLost ? t("The robot may still be on its way to waypoint {number} of {count}", way) : t("On the way to waypoint {number} of {count}", way);
       return [told, active.by].filter(Boolean).join(" · ");
@@ -480,7 +482,9 @@ export class Choice {
     if (this.isTrip && this.trip) {
       const { by, isLost, yaw: turn } = this.trip;
       const way = { place: this.placeText(this.trip.place, turn) };
-      return [isLost ? t("The robot may still be on its way to {place}", way) : t("On the way to {place}", way), by].filter(Boolean).join(" · ");
+      const told = isLost ? t("The robot may still be on its way to {place}", way) : t("On the way to {place}", way);
+      const left = kept && !active ? t("Waypoints left: {count}", { count: kept.size }) : "";
+      return [told, by, left].filter(Boolean).join(" · ");
     }
     const { told } = this.feedback;
     if (mode === "look" && told && this.isOther()) return t("On the way to waypoint {number}", { number: told.value + 1 });

@@ -23,7 +23,10 @@ export function shareGoals(choice, news) {
   const isNews = choice.news !== news;
   choice.news = news;
   if (isKnown) {
-    const last = (/** @type {string} */ output) => goals.filter((one) => one.output === output).at(-1);
+    const last = (/** @type {string} */ output) => {
+      const own = goals.filter((one) => one.output === output);
+      return own.filter(({ isLost }) => !isLost).at(-1) ?? own.at(-1); // a lost goal hides no running one
+    };
     choice.trip = tripOf(last("goto"), choice.isLocal);
     shareRoute(choice, last("waypoints"));
   } else if (isNews) {

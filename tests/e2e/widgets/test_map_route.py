@@ -307,13 +307,15 @@ async def test_a_route_of_another_screen_disappears_when_it_ends(new_page: PageM
 async def test_after_a_new_session_a_route_is_ended_by_the_robots_feedback(
     new_page: PageMaker,
 ) -> None:
-    """As after a restart of the server, nobody knows the points; nothing false is shown."""
+    """Nobody knows the points of a route that another program sends; nothing false is shown."""
     page = await new_page(size="desktop")
     async with followed(page) as robot:
         await drawn(page, (1, 0), (2, 0))
         await sent(page, robot)
         url = page.url
         await page.goto("about:blank")
+        assert robot.way is not None
+        robot.way.set_result(None)
         await until(lambda: not robot.is_open)
         await page.goto(url)
         await until(lambda: robot.is_open)

@@ -48,15 +48,45 @@ def test_stop_ends_all_lost_goals_but_no_goal_that_has_a_reply_to_come() -> None
     assert [one.number for one in goals] == [running]
 
 
-def test_a_newer_goal_of_the_action_replaces_a_lost_one_once_it_is_sent() -> None:
+def test_a_newer_goal_of_the_action_does_not_hide_a_lost_one() -> None:
+    """Not every robot ends a goal for the next one, and the robot may refuse the newer goal."""
     goals = RunningGoals()
     lost = goals.begin(GOTO)
     goals.sent(lost, "/navigate_to_pose")
-    goals.end(lost, is_lost=True)
     newer = goals.begin(GOTO)
-    assert [one.number for one in goals] == [lost, newer], "it may be refused"
+    goals.end(lost, is_lost=True)
     goals.sent(newer, "/navigate_to_pose")
-    assert [one.number for one in goals] == [newer]
+    assert [one.number for one in goals] == [lost, newer], "oldest first"
+    goals.end(newer)
+    assert [one.number for one in goals] == [lost]
+
+
+def test_a_person_dismisses_a_lost_goal_but_no_goal_that_has_a_reply_to_come() -> None:
+    goals = RunningGoals()
+    lost, running = goals.begin(GOTO), goals.begin(GOTO)
+    goals.sent(lost, "/navigate_to_pose")
+    goals.end(lost, is_lost=True)
+    assert goals.is_awaited
+    assert [goals.dismiss(one) for one in (running, lost, lost, 99)] == [False, True, False, False]
+    assert [one.number for one in goals] == [running]
+    goals.end(running)
+    assert not goals.is_awaited
+
+
+def test_a_sequence_is_lost_with_the_goals_whose_end_is_not_known() -> None:
+    goals = RunningGoals()
+    tour, over = goals.begin(RunningGoal(0, "tour")), goals.begin(RunningGoal(0, "over"))
+    for action in ("/undock", "/navigate_to_pose", "/dock"):
+        goals.sent(tour, action)
+    goals.over(tour, "/undock")
+    goals.sent(over, "/undock")
+    goals.over(over, "/undock")
+    for number in (tour, over):
+        goals.end(number, is_lost=True)
+    assert [one.actions for one in goals] == [("/navigate_to_pose", "/dock")]
+    assert goals.settle("/dock")
+    goals.over(tour, "/navigate_to_pose")
+    assert commands(goals) == [], "a late reply ends it, too"
 
 
 def test_goals_are_bounded_and_the_newest_stay() -> None:

@@ -12,6 +12,7 @@ from tests.unit.web.test_consent import Screens
 from urc.model.driver import Argument, Command, Reply
 from urc.model.payload import Envelope, ReadSpec, WriteSpec
 from urc.model.role import Role
+from urc.model.sequence import WaitStep
 from urc.model.values import Reading
 from urc.protocol.events import Replied
 from urc.runtime.command_failed import CommandFailed
@@ -230,7 +231,7 @@ async def driven() -> AsyncIterator[tuple[Rover, RobotService, Screens]]:
         await settle()
 
 
-async def goals(robot: Rover, line: FakeLine) -> list[dict[str, Any]]:
+async def goals(robot: Slow, line: FakeLine) -> list[dict[str, Any]]:
     """Return the goals that a page knows."""
     await settle()
     await robot.fake.advance(1)  # to the next flush
@@ -297,18 +298,99 @@ async def test_a_route_with_an_unknown_outcome_stays_until_another_page_ends_it(
         assert await goals(robot, other) == []
 
 
-async def test_the_end_of_a_session_ends_what_is_known_of_its_goals() -> None:
-    """A later session knows nothing of the route, and says nothing of it."""
-    async with driven() as (robot, _, screens):
+async def test_a_session_without_pages_follows_a_route_to_its_end() -> None:
+    async with driven() as (robot, service, screens):
         first = await screens.come()
         first.say(ROUTE)
         await settle()
         first.leave()
         await settle()
+        await robot.fake.advance(100)
+        assert robot.is_open
+        (goal,) = await goals(robot, await screens.come())
+        assert not goal.get("lost")
+        await screens.end()
+        await robot.fake.advance(100)
+        robot.ways[0].set_result(None)
         await robot.fake.advance(10)
         assert not robot.is_open
-        assert robot.ways[0].cancelled()
+        assert service.is_at_rest
         assert await goals(robot, await screens.come()) == []
+
+
+async def test_a_lost_route_outlives_its_session_until_a_person_dismisses_it() -> None:
+    """A page that is opened later must see it, and a newer goal does not hide it."""
+    async with driven() as (robot, service, screens):
+        first = await screens.come()
+        first.say(ROUTE)
+        await settle()
+        robot.ways[0].set_exception(CommandFailed("disconnected", "the connection is lost"))
+        await settle()
+        first.leave()
+        await settle()
+        await robot.fake.advance(100)
+        assert not robot.is_open
+        assert not service.is_at_rest
+        later, watcher = await screens.come(), await screens.come("watch")
+        (goal,) = await goals(robot, later)
+        assert goal["lost"]
+        later.say({**ROUTE, "id": 3})
+        assert [one.get("lost", False) for one in await goals(robot, later)] == [True, False]
+        watcher.say({"t": "dismiss", "goal": goal["number"]})
+        assert len(await goals(robot, later)) == 2
+        later.say({"t": "dismiss", "goal": goal["number"]})
+        assert [one.get("lost", False) for one in await goals(robot, later)] == [False]
+        robot.ways[1].set_result(None)
+
+
+async def test_a_route_whose_session_must_end_is_lost() -> None:
+    """The robot's document has changed, for example. The next session gets no reply."""
+    async with driven() as (robot, service, screens):
+        first = await screens.come()
+        first.say(ROUTE)
+        await settle()
+        service.replace(Robot(robot.profile, {}, robot.open))
+        await settle()
+        assert robot.ways[0].cancelled()
+        (goal,) = await goals(robot, await screens.come())
+        assert goal["lost"]
+
+
+class Tourist(Slow):
+    """A ROS robot with a sequence that sends two goals and then loses its connection."""
+
+    async def command(self, name: str, arguments: Mapping[str, Reading], **more: Any) -> Replied:
+        """Report the goals of the sequence, as the engine does."""
+        on_goal = more.pop("on_goal")
+        await FakeRobot.command(self, name, arguments, **more)
+        if on_goal is not None:
+            for action, is_over in (("/undock", False), ("/undock", True), ("/follow", False)):
+                on_goal(action, is_over)
+        await self.done.wait()
+        raise CommandFailed("disconnected", "the connection is lost")
+
+
+async def test_a_sequence_whose_connection_is_lost_stays_with_its_goal() -> None:
+    robot = Tourist()
+    tour = Command(
+        "tour", "wire", WriteSpec("text"), steps=(WaitStep(1),), moves=True, title="Tour"
+    )
+    profile = dashboard_profile(commands={**COMMANDS, "tour": tour})
+    robot.profile = profile
+    service = RobotService(Robot(profile, {}, robot.open), clock=robot.fake)
+    running = asyncio.create_task(service.run())
+    screens = Screens(service, robot, robot.fake)
+    line = await screens.come()
+    line.say({"t": "run", "id": 2, "command": "tour"})
+    await settle()
+    robot.done.set()
+    (goal,) = await goals(robot, line)
+    assert (goal["command"], goal["title"], goal["lost"]) == ("tour", "Tour", True)
+    (kept,) = robot.hub.goals
+    assert kept.actions == ("/follow",)
+    await screens.end()
+    running.cancel()
+    await settle()
 
 
 async def test_two_operators_one_drives_and_the_other_may_stop_and_cancel() -> None:

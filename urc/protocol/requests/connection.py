@@ -68,8 +68,9 @@ class Connection:
         """Matcher of the replies to held commands; these commands bypass the queue."""
         self.is_behind = False
         """Whether received frames remain in the buffer until `process_frames` is called again."""
-        self._askers: dict[object, object] = {}
-        """Sequences whose numbered requests are pending, keyed by request number."""
+        self._askers: dict[object, Exchange] = {}
+        """Numbered requests, keyed by number, whose replies belong to a later step or end a
+        goal."""
         self._waiting_goals: dict[object, Exchange] = {}
         """Sent goals that may still wait for their services, keyed by request number."""
         self._is_leaving = False
@@ -219,8 +220,8 @@ class Connection:
         """Keep what later frames refer to: goals that wait for services, and numbered requests."""
         if self.codec is not None and isinstance(data, Envelope) and data.verb == GOAL:
             _keep(self._waiting_goals, number, exchange, MAX_WAITING)
-        if number is not None and not exchange.ask.answers:
-            _keep(self._askers, number, exchange.owner, MOST_IN_FLIGHT)
+        if number is not None and (not exchange.ask.answers or exchange.goal is not None):
+            _keep(self._askers, number, exchange, MOST_IN_FLIGHT)
 
     def _refused(self, goal: Envelope, now: float) -> Envelope | None:
         """Return a refusal of a goal that must not be sent any more, or None.

@@ -199,6 +199,8 @@ class Conversation(Connection):
         data = self._as_sent(exchange, number)
         if exchange.on_sent is not None and not exchange.is_secret:
             exchange.on_sent(data)
+        if exchange.goal is not None:
+            exchange.goal.sent(data)
         exchange.sent_at = now
         if self.counting is None or ask.label in self.counting:
             self.last_sent = now
@@ -420,13 +422,17 @@ class Conversation(Connection):
         number, reason = attributes.get("id"), ""
         if not attributes.get("ok", True):
             reason = str(attributes.get("reason") or "the robot refused")
+        asker = self._askers.pop(number, None)
+        if asker is not None and asker.goal is not None:
+            asker.goal.ended()  # even if its request has already timed out
         pending = self._pending_replies.numbered(number)
         if pending is None:
             if number is None and self.held.is_listening(now):
                 return self._motion_response(frame, attributes, now)
             # The reply belongs to a step, or its request has already timed out.
-            asker = self._askers.pop(number, None)
-            return [] if asker is None else self.receiver.answered(asker, frame, reason, now)
+            if asker is None:
+                return []
+            return self.receiver.answered(asker.owner, frame, reason, now)
         if reason and pending.expectation.answer.takes_redirects and is_redirect(frame):
             reason = ""
         offer = pending.refused(frame, reason) if reason else pending.answer(frame)

@@ -16,6 +16,7 @@ from urc.model.values import NOTHING, Reading
 from urc.protocol.events import Event, Failed, Replied, Request
 from urc.protocol.framing.base import Framing
 from urc.protocol.requests.encode import Encode
+from urc.protocol.requests.goal_watch import GoalWatch
 from urc.protocol.requests.rate import REALTIME, Counters, GcraLimiter
 from urc.protocol.requests.reply_match import CompiledReply, Matched, Matcher
 
@@ -147,6 +148,8 @@ class Exchange:
     """Earliest time at which a retry may be sent, in seconds."""
     on_sent: Callable[[Payload], None] | None = None
     """Callback for each sent payload."""
+    goal: GoalWatch | None = None
+    """Object that reports the start and the end of the request's goal of a ROS action."""
 
     def __init__(
         self,

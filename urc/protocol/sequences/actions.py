@@ -14,6 +14,7 @@ from urc.protocol.events import Samples
 from urc.protocol.requests.connection import GOAL
 from urc.protocol.requests.encode import BadArgument
 from urc.protocol.requests.exchange import CompiledRequest, Exchange, LineEvent, expires_at, untold
+from urc.protocol.requests.goal_watch import GoalWatch
 from urc.protocol.requests.reply_match import CompiledReply, Expectation, Matcher
 from urc.protocol.requests.request_compiler import RequestCompiler
 from urc.protocol.sequences.sequence_control import SequenceControl
@@ -179,6 +180,8 @@ def _sending(ask: CompiledRequest, step: sequence.SendStep) -> Action:
             is_secret=step.is_secret,
             unless=runner.why_no_goal if is_goal else runner.why_over,
         )
+        if is_goal and runner.on_goal is not None:
+            exchange.goal = GoalWatch(runner.on_goal)
         runner.wait()
         return line.submit(exchange, now)
 
@@ -243,6 +246,7 @@ def _running(step: sequence.RunStep) -> Action:
             privileged_on=runner.privileged_on,
             confirmed_by=runner.confirmed_by,
             unless=runner.why_no_goal if is_goal else runner.why_over,
+            on_goal=runner.on_goal,
         )
 
     return run

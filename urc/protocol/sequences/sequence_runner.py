@@ -15,6 +15,7 @@ from urc.protocol.requests.bounds import queue_limit_s
 from urc.protocol.requests.condition_scope import SignalState
 from urc.protocol.requests.conversation import Conversation
 from urc.protocol.requests.exchange import DONE, Exchange, ExchangeOutcome, LineEvent
+from urc.protocol.requests.goal_watch import OnGoal
 from urc.protocol.requests.reply_match import Expectation, MatchResult
 from urc.protocol.sequences.sequence_control import PAUSE_S, SequenceControl
 
@@ -43,6 +44,7 @@ class SequenceHost(Protocol):
         privileged_on: str,
         confirmed_by: tuple[str, ...],
         unless: Unless,
+        on_goal: OnGoal | None,
     ) -> list[LineEvent]:
         """Run a command or sequence and report the outcome to `sink`."""
 
@@ -110,6 +112,9 @@ class SequenceRunner:
         """Connections that must complete their logins before the first step."""
         self.unless: Unless | None = None
         """Function that returns why the sequence may start no goal now, or ""."""
+        self.on_goal: OnGoal | None = None
+        """Callback for the goals of the sequence, and of the commands and sequences that it
+        runs."""
         program.sequence_control.start()
 
     @property

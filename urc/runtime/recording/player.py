@@ -285,6 +285,7 @@ class PlaybackSession:
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
+        on_goal: Callable[[str, bool], None] | None = None,
     ) -> Replied:
         """Refuse the command."""
         raise CommandFailed("not-allowed", REFUSAL)

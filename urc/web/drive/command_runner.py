@@ -8,6 +8,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from typing import Any, Final, NamedTuple, Protocol, TypeVar
 
 from urc.guard.goal_reports import GoalReports
@@ -62,6 +63,7 @@ class CommandTarget(Protocol):
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
+        on_goal: Callable[[str, bool], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
@@ -229,6 +231,7 @@ class CommandRunner:
     ) -> Replied | CommandFailed:
         """Run a command that starts motion, and show it on all pages until it has ended."""
         client, hub, loop = operator.client, target.hub, asyncio.get_running_loop()
+        known = self._controls.once.driver.commands[asked.command]
         goal = RunningGoal(
             0,
             asked.command,
@@ -236,13 +239,17 @@ class CommandRunner:
             client.name,
             client.id,
             self._clock.now(),
+            title=known.title,
         )
         number, is_lost = hub.begin_goal(goal), True
 
+        def on_goal(action: str, is_over: bool) -> None:
+            # Later, because the engine is at work now.
+            loop.call_soon(partial(hub.sent_goal, number, action, is_over=is_over))
+
         def on_sent(payload: Payload) -> None:
             sent.append(payload)
-            # Later, because the engine is at work now.
-            loop.call_soon(hub.sent_goal, number, action_of(payload, "goal"))
+            on_goal(action_of(payload, "goal"), False)
 
         try:
             replied = await target.command(
@@ -251,14 +258,32 @@ class CommandRunner:
                 confirmed_by=people,
                 on_sent=on_sent,
                 unless=unless,
+                on_goal=on_goal,
             )
             is_lost = False
         except CommandFailed as failed:
-            is_lost = failed.code in LOST
+            # A sequence that has failed ends none of its goals.
+            is_lost = failed.code in LOST or bool(known.steps)
             return failed
         finally:
             hub.end_goal(number, is_lost=is_lost)
         return replied
+
+    def dismiss(self, operator: OperatorSession, number: int, hub: Hub) -> None:
+        """Drop a lost goal that an operator knows to have ended; ignore unknown numbers."""
+        goal = next((one for one in hub.goals if one.number == number and one.is_lost), None)
+        if goal is None:
+            return
+        self._controls.recheck(operator)
+        client, recorder = operator.client, self._controls.recorder
+        reason = role_refusal(client, "drive")
+        if not operator.rights.may_give(goal.command):
+            reason = OUT_OF_SCOPE
+        if reason:
+            recorder.refused(client, goal.command, reason, self._clock.now())
+            return
+        hub.dismiss_goal(number)
+        recorder.ran(client, goal.command, {}, "dismissed: the operator says that it has ended")
 
     async def end(self) -> None:
         """Stop following the motion of a session that has ended."""

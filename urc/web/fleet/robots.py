@@ -33,6 +33,7 @@ from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
 from urc.runtime.latch import LatchStore
 from urc.runtime.robot_alarms import RobotAlarms
+from urc.runtime.running_goals import RunningGoals
 from urc.web.drive.command_runner import CommandRunner
 from urc.web.drive.control_service import ControlService
 from urc.web.drive.two_person import TwoPersonRule
@@ -122,6 +123,7 @@ class SessionLike(MotionSession, Protocol):
         confirmed_by: tuple[str, ...] = (),
         on_sent: Callable[[Payload], None] | None = None,
         unless: Callable[[], str] | None = None,
+        on_goal: Callable[[str, bool], None] | None = None,
     ) -> Replied:
         """Run a command and return its reply; raise `CommandFailed` if the command fails."""
 
@@ -253,6 +255,8 @@ class RobotService:
         """Number of callers that currently need the robot disconnected."""
         self._successor: tuple[Robot, LatchStore | None] | None = None
         self._last_picture: bytes | None = None
+        self._goals = RunningGoals()
+        """Goals of all sessions; a later page must see a goal of an earlier session."""
 
     @property
     def is_used(self) -> bool:
@@ -351,8 +355,7 @@ class RobotService:
     @property
     def has_goal(self) -> bool:
         """Whether the robot follows a goal, or may follow a lost one."""
-        live = self.open_session
-        return live is not None and any(live.session.hub.goals)
+        return any(self._goals)
 
     @property
     def is_at_rest(self) -> bool:
@@ -439,6 +442,7 @@ class RobotService:
             yield session
 
     async def _serve(self, session: SessionLike) -> None:
+        session.hub.share_goals(self._goals)
         each = keep_all_signals(self.robot.profile)
         commands = self.robot.profile.driver.commands
         movers = [name for name, one in commands.items() if one.moves and one.steps]
@@ -487,8 +491,18 @@ class RobotService:
                 await self._changed.wait()
             alarm.cancel()
             await self._until_stopped()
+            await self._until_arrived()
             if not self._has_clients or self._is_unwanted:
                 return
+
+    async def _until_arrived(self) -> None:
+        """Wait for the replies to all goals; each reply has a time limit.
+
+        Without the session, the replies would be lost, and a later page could not tell whether the
+        robot still follows the goals.
+        """
+        while self._goals.is_awaited and not (self._has_clients or self._is_unwanted):
+            await self.clock.sleep(_SELDOM_S)
 
     async def _until_stopped(self) -> None:
         """Wait until every stop has reached the robot, for at most `STOP_DUE_S` seconds.

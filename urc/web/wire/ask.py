@@ -78,6 +78,7 @@ def encode_progress(
                     one.page,
                     milliseconds(now_s - one.since_s),
                     one.is_lost,
+                    cut(one.title),
                 )
                 for one in goals
             ],

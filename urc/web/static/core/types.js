@@ -316,6 +316,7 @@
  * @typedef {object} SentGoal A goal from the server, for all widgets.
  * @property {number} number
  * @property {string} command
+ * @property {string} title Title of the command; "" without one.
  * @property {Readonly<Record<string, number | readonly number[]>>} places Its arguments with numbers.
  * @property {string} by
  * @property {boolean} isOurs

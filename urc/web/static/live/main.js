@@ -16,6 +16,7 @@ import { frameOf } from "./frames.js";
 import { offerHints } from "./hints.js";
 import { Host } from "../widgets/host.js";
 import { Input } from "../control/input.js";
+import { LostGoals } from "./lost_goals.js";
 import { LostCard } from "./lost_card.js";
 import { Panel } from "./panel.js";
 import { FullScreen, WakeLock } from "./screen.js";
@@ -69,6 +70,7 @@ const socket = new Socket(address.href, {
     if (!isUp) {
       giveUpCommands();
       goals = UNKNOWN_GOALS; // until the server tells of them again
+      lostGoals.show([]);
       drive.lost();
       asks.lost();
       input.spendAll(t("the connection to URC was lost"));
@@ -85,6 +87,11 @@ const bar = root.querySelector("[data-controls]");
 const stop = new StopButton(drive, input, store, JSON.parse(root.dataset["lines"] ?? "[]"), bar !== null);
 const asks = new ConfirmDialog(part(root, "[data-bands]"), (message) => socket.send(message));
 stop.onPressed = forgetQuestions;
+const lostGoals = new LostGoals(
+  part(root, "[data-bands]"),
+  part(root, "[data-alarm-strip]").hasAttribute("data-may-act"),
+  (message) => socket.send(message),
+);
 /** States of the sequences. @type {Record<string, import("../core/types.js").Progress>} */
 let sequences = {};
 const controls = bar instanceof HTMLElement ? new Controls(root, bar, drive, stop, input) : null;
@@ -267,6 +274,7 @@ function take(message) {
       sequences = Object.fromEntries(message.sequences.map((/** @type {import("../core/types.js").Progress} */ one) => [one.command, one]));
       stop.moving = message.moving;
       goals = sentGoals(message.goals, nowMs);
+      lostGoals.show(goals.value.goals);
       break;
     case "pong":
       store.pong(message.n, nowMs, socket.tripMs);
@@ -314,9 +322,10 @@ function take(message) {
  * @param {number} nowMs
  */
 function sentGoals(rows, nowMs) {
-  const value = rows.map(({ number, command, places, by, page, since, lost = false }) => ({
+  const value = rows.map(({ number, command, places, by, page, since, lost = false, title = "" }) => ({
     number,
     command,
+    title,
     places,
     by,
     isOurs: page === drive.lease?.you,

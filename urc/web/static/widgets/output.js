@@ -97,7 +97,7 @@ function scale(value, range) {
  */
 export function goalsOf(outputs, goals) {
   const bound = [...outputs];
-  return goals.flatMap(({ command, places, ...goal }) => {
+  return goals.flatMap(({ command, title: _, places, ...goal }) => {
     const found = bound.find(([, output]) => output.command === command);
     if (!found) return [];
     const [output, { names, fixed }] = found;
