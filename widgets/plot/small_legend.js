@@ -44,6 +44,7 @@ export class SmallLegend {
     const { display, maxHeight, lineHeight, columnGap } = getComputedStyle(list);
     const isSmall = display === "grid";
     for (const item of items) item.toggleAttribute("data-hidden", false);
+    style(list, "--plot-columns", "1"); // as wide as they want to be: a narrow column shortens names
     let shown = items.length;
     if (isSmall && list.clientWidth > 0) {
       const gap = parseFloat(columnGap) || 0;

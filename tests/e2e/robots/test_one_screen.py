@@ -17,7 +17,7 @@ from tests.effort import sampled
 
 pytestmark = pytest.mark.anyio
 
-SCREENS = ((1280, 720), (1280, 800), (1180, 820), (844, 390), (390, 844))
+SCREENS = ((1280, 720), (1280, 800), (1180, 820), (844, 390), (667, 375), (390, 844))
 ROBOTS = 4
 """Robots in an everyday run."""
 ONE_SCREEN = (Path(__file__).parent / "one_screen.js").read_text("utf-8")
