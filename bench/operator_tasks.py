@@ -39,10 +39,14 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 ROUNDS, ROUNDS_IF_FULL = 1, 3
 FLEET, WITH_ALARM = 12, 6
 HOLD = "hold: { repeat: 100ms,"
+LEASE = "450ms"
+"""The longest lease that is shorter than the watchdog of the robot's base, which is 500 ms."""
 READY_S = 60.0
 GUARD_MS = 3000
 """Time in which the guard of a robot starts; until then, no gesture drives."""
-READY = "() => document.querySelector('.joystick')?.dataset.phase === 'idle'"
+READY = """() => document.querySelector('.joystick')?.dataset.phase === 'idle'
+  && /driv/.test(document.querySelector('[data-who]')?.textContent ?? '')"""
+"""The stick is shown, and the page knows who drives; until then, a push has no effect."""
 ROVER = """\
 urc: 1
 kind: robot
@@ -179,7 +183,7 @@ def _turtlebot(folder: Path, version: Version) -> list[str]:
     file = robots / "drivers/ros-base.yaml"
     text = file.read_text("utf-8")
     assert text.count(HOLD) == 1, file
-    file.write_text(text.replace(HOLD, f"{HOLD} lease: 500ms,"), "utf-8")
+    file.write_text(text.replace(HOLD, f"{HOLD} lease: {LEASE},"), "utf-8")
     return [str(robots / "turtlebot4.yaml")]
 
 
