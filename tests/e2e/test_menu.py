@@ -22,13 +22,18 @@ LYING = {"width": 844, "height": 390}
 WHOLE_ROWS = """() => [...document.querySelectorAll("[data-robot-card]")]
   .filter((card) => card.getBoundingClientRect().bottom <= innerHeight).length"""
 
-# Parts of a card that lie over each other, but for the link, which covers the card.
+# Parts of a card that lie over each other, but for the link, which covers the card, and the marks
+# in the corners of the image.
 OVERLAPS = """() => [...document.querySelectorAll("[data-robot-card]")].flatMap((card) => {
-  const selector = ".urc-look, .urc-robot-title, .urc-robot-state, .urc-more-button";
-  const parts = [...card.querySelectorAll(selector)].map((el) => el.getBoundingClientRect());
+  const words = [".urc-robot-title", ".urc-robot-kind", ".urc-robot-state", ".urc-robot-go"];
+  const marks = [".urc-sim", ".urc-more-button"];
+  const place = (selector) => [...card.querySelectorAll(selector)]
+    .map((el) => el.getBoundingClientRect()).filter(({ width }) => width > 0);
   const over = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
     Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 1;
-  return parts.some((a, n) => parts.slice(n + 1).some((b) => over(a, b)))
+  const isOver = (parts) => parts.some((a, n) => parts.slice(n + 1).some((b) => over(a, b)));
+  const here = words.flatMap(place);
+  return isOver([...place(".urc-look"), ...here]) || isOver([...marks.flatMap(place), ...here])
     ? [card.dataset.robotCard] : [];
 })"""
 
@@ -48,6 +53,7 @@ async def test_eight_robots_fit_on_the_screen_of_a_phone(new_page: PageMaker) ->
         page = await new_page(size="phone")
         await page.goto(address)
         assert await page.evaluate(WHOLE_ROWS) >= 8
+        await expect(page.locator(".urc-robot-kind").first).to_be_hidden()
         row = await page.locator(card(page, 0)).bounding_box()
         assert row is not None
         assert row["height"] == pytest.approx(88, abs=1)
@@ -77,6 +83,22 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
         await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
+
+
+async def test_a_card_says_what_kind_of_robot_it_is(new_page: PageMaker) -> None:
+    """The first clause of the summary; the search finds all of it."""
+    robot = dashboard_profile(name="salamandra-0")
+    told = robot._replace(summary="Snake robot, controlled by radio. It has no fail-safe.")
+    named = dashboard_profile(name="rover")._replace(summary="Rover, with wheels.")
+    others = fleet(8)[2:]
+    async with running_dashboard(FakeRobot(told), FakeRobot(named), *others) as address:
+        page = await new_page()
+        await page.goto(address)
+        await expect(page.locator(f"{card(page, 0)} .urc-robot-kind")).to_have_text("Snake robot")
+        rover = page.locator("[data-robot-card='rover']")
+        await expect(rover.locator(".urc-robot-kind")).to_have_count(0)
+        await page.get_by_label("Find a robot").fill("radio")
+        await expect(page.locator("[data-robot-card]:visible")).to_have_count(1)
 
 
 async def test_a_hidden_tab_asks_for_nothing(new_page: PageMaker) -> None:

@@ -4,10 +4,12 @@ Layer 5. Pure. The template `menu.html.j2` receives a `MenuPage`; all other page
 have a `Nav`.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 from time import gmtime, strftime
+from typing import Final
 from urllib.parse import quote
 
 from urc.model.profile import Setting
@@ -19,6 +21,8 @@ from urc.web.show.pages import PageHead, render
 from urc.web.words import t
 
 __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_page", "setting_row"]
+
+_CLAUSE_END: Final = re.compile(r"[,;:]\s|\.(?:\s|$)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +68,8 @@ class Card:
     """The robot's name in URLs."""
     title: str
     summary: str
+    kind: str
+    """First clause of the summary, which the card shows in one line; "" for no such line."""
     url: str
     link: str
     """URL of the robot's page, or of its settings while a setting is missing; "" if there is no URL
@@ -173,6 +179,7 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
         name=name,
         title=title,
         summary=profile.summary,
+        kind=_kind(profile.summary, title),
         url=url,
         link=link,
         link_label=label,
@@ -189,6 +196,12 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
         is_emulated=robot.is_emulated,
         recorded=_utc(robot.playback.began_s) if robot.playback is not None else "",
     )
+
+
+def _kind(summary: str, title: str) -> str:
+    """Return the first clause of a summary; "" if it only repeats the title."""
+    clause = _CLAUSE_END.split(summary.strip(), maxsplit=1)[0]
+    return "" if clause.casefold() == title.casefold() else clause
 
 
 def _initials(title: str) -> str:
@@ -209,6 +222,7 @@ def _broken(name: str, one: BrokenRobot, ways: NavigationLinks) -> Card:
         name=name,
         title=one.title,
         summary="",
+        kind="",
         url=url,
         link=settings_url,
         link_label=label,

@@ -57,6 +57,7 @@ function show(card, robot, nowS) {
   const link = linkWords(robot, nowS);
   card.dataset["state"] = link.state;
   card.dataset["alarms"] = String(robot.alarms.count);
+  card.dataset["worst"] = robot.alarms.worst;
   put(card, "[data-link]", link);
   put(card, "[data-alarms]", alarmWords(robot));
   put(card, "[data-battery]", batteryWords(robot));
@@ -106,7 +107,7 @@ function find() {
   const tag = pressed(tags)?.dataset["tag"] ?? "";
   let found = 0;
   for (const card of cards) {
-    const said = [...card.querySelectorAll("h2, .urc-robot-summary")].map((el) => el.textContent ?? "");
+    const said = [...card.querySelectorAll("h2, [data-summary]")].map((el) => el.textContent ?? "");
     const own = (card.dataset["cardTags"] ?? "").split(" ");
     const isShown =
       fits([card.dataset["robotCard"] ?? "", ...said, ...own.map((one) => `#${one}`)].join(" "), typed) &&
