@@ -109,3 +109,23 @@ test("a reset names the STOPs that its page knows", () => {
   drive.say("take");
   assert.deepEqual(sent, [{ t: "drive", verb: "reset", stops: 5 }, { t: "drive", verb: "take" }]);
 });
+
+test("the time of a latched STOP is known only to a page that was connected", () => {
+  const socket = { unsent: 0, tripMs: 2, send: () => true };
+  const drive = new Drive(/** @type {any} */ (socket), "", () => {});
+  const lease = { you: "s1", epoch: 3, stops: 4, holder: null, asker: null, latched: "bob", confirmed: true, drives: true, left: 0 };
+  const set = (/** @type {object} */ news) => drive.setLease(/** @type {any} */ ({ ...lease, ...news }), nowMs);
+  set({});
+  assert.equal(drive.latchedAtMs, null, "pressed before the page came");
+  const pressedMs = Date.now();
+  set({ stops: 5 });
+  const atMs = drive.latchedAtMs ?? 0;
+  assert.ok(atMs >= pressedMs && atMs <= Date.now());
+  set({ stops: 5, epoch: 4 });
+  assert.equal(drive.latchedAtMs, atMs, "the same STOP");
+  drive.lost();
+  set({ stops: 6 });
+  assert.equal(drive.latchedAtMs, null, "pressed again while the page was away");
+  set({ stops: 6, latched: "" });
+  assert.equal(drive.latchedAtMs, null);
+});

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,30 @@ async def test_stop_acts_when_it_is_touched_and_latches(new_page: PageMaker) -> 
         await push(page)
         await robot.until_moving()
         await page.mouse.up()
+
+
+async def test_the_button_says_stopped_once_the_stop_is_confirmed(new_page: PageMaker) -> None:
+    """The bar tells when; a second press sends the stop again; after a reset it is STOP."""
+    async with calmly_driven() as (robot, address):
+        page = await opened(new_page, address)
+        button = page.locator(STOP)
+        await expect(button).to_have_text("STOP")
+        robot.line.is_up = False
+        await button.click()
+        await until_text(page, NOTE, "✓ sent ✓ latched")
+        await expect(button).to_have_text("STOP")
+        robot.line.is_up = True
+        robot.line.write_due()
+        await until_text(page, NOTE, DONE)
+        await expect(button).to_have_text("STOPPED")
+        when = page.locator("[data-latched-when]")
+        await expect(when).to_have_text(re.compile(r"^at \d\d:\d\d$"))
+        count = len(robot.line.written)
+        await page.get_by_role("button", name="STOPPED: press to send STOP again").click()
+        await until(lambda: set(robot.after(count)) == {"drive stop", "lift stop"})
+        await page.click(RESET)
+        await expect(button).to_have_text("STOP")
+        await expect(page.get_by_role("button", name="STOP", exact=True)).to_be_visible()
 
 
 async def test_escape_and_the_click_of_a_screen_reader_stop_too(new_page: PageMaker) -> None:
@@ -265,6 +290,7 @@ async def opened_latched(new_page: PageMaker, address: str) -> Page:
     page = await fresh(new_page)
     await page.goto(address)
     await until_text(page, "[data-latched-text]", "■ Stopped by screen 1, before a restart")
+    await expect(page.locator("[data-latched-when]")).to_be_hidden()
     return page
 
 

@@ -39,8 +39,11 @@ export class Controls {
     this.latched = part(root, "[data-latched]");
     this.latchedText = part(root, "[data-latched-text]");
     this.latchedNext = part(root, "[data-latched-next]");
+    this.latchedWhen = part(root, "[data-latched-when]");
     this.stop = part(el, "[data-stop-button]");
     this.stopNote = part(el, "[data-stop-note]");
+    /** Whether the latched STOP is confirmed, and the robot is connected. */
+    this.isProven = false;
     /** @type {[Verb, HTMLElement][]} */
     this.buttons = VERBS.map((verb) => [verb, part(root, `[data-verb="${verb}"]`)]);
     for (const [verb, button] of this.buttons) {
@@ -125,10 +128,16 @@ export class Controls {
     const stopped = isLatched ? this.stoppedWords() : "";
     if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
     if (this.latchedText.textContent !== stopped) this.latchedText.textContent = stopped;
+    const when = isLatched ? this.stoppedWhen() : "";
+    if (this.latchedWhen.textContent !== when) {
+      this.latchedWhen.textContent = when;
+      this.latchedWhen.hidden = when === "";
+    }
     if (this.latched.hidden === isLatched) {
       this.latched.hidden = !isLatched;
       this.isResetNext = isLatched;
     }
+    this.nameStop(this.isProven && isLatched && lease !== null);
     const state = isLatched ? "latched" : isMine ? "mine" : isOthers ? "others" : "free";
     if (this.el.dataset["state"] !== state) this.el.dataset["state"] = state;
   }
@@ -158,10 +167,34 @@ export class Controls {
     return by && by === lease?.name ? t("■ Stopped by you") : t("■ Stopped by {who}", { who: said(by) });
   }
 
+  /** Return the time of the latched STOP as text; "" if this page does not know the time. */
+  stoppedWhen() {
+    const atMs = this.drive.latchedAtMs;
+    if (atMs === null) return "";
+    const time = new Date(atMs).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", hour12: false });
+    return t("at {time}", { time });
+  }
+
+  /**
+   * Show the word on the button: STOP, or STOPPED for a latched STOP. Without a confirmation or a
+   * connection, the button keeps the word STOP.
+   *
+   * @param {boolean} isStopped
+   */
+  nameStop(isStopped) {
+    const word = isStopped ? t("STOPPED") : "STOP";
+    if (this.stop.textContent === word) return;
+    this.stop.textContent = word;
+    if (isStopped) this.stop.setAttribute("aria-label", t("STOPPED: press to send STOP again"));
+    else this.stop.removeAttribute("aria-label");
+    this.stop.title = isStopped ? t("Press to send STOP again") : "";
+  }
+
   /** @param {StopState} state */
   showStop({ phase, isLatched, isConfirmed, fault }) {
     const isSent = phase !== "" && phase !== "sending" && phase !== "failed";
     this.stop.dataset["phase"] = fault && !isConfirmed ? "fault" : phase;
+    this.isProven = phase === "confirmed" && fault === "";
     const steps = [
       isSent ? t("✓ sent") : "",
       isConfirmed ? t("✓ confirmed") : "",

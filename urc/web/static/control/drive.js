@@ -45,6 +45,13 @@ export class Drive {
      * @type {number | null}
      */
     this.stops = null;
+    /**
+     * Time of the latched STOP, in milliseconds since 1970 on this device's clock; null if STOP is
+     * not latched, or if this page was not connected at that time.
+     *
+     * @type {number | null}
+     */
+    this.latchedAtMs = null;
     /** Newest heartbeat number from the server; 0 before the first heartbeat. */
     this.beat = 0;
     this.beatMs = 0;
@@ -89,6 +96,7 @@ export class Drive {
   setLease(lease, nowMs) {
     const wasMine = this.isMine;
     const isStopped = this.stops !== null && lease.stops !== this.stops;
+    this.witness(lease, isStopped);
     this.stops = lease.stops;
     this.lease = lease;
     this.handedMs = nowMs + lease.left;
@@ -103,6 +111,17 @@ export class Drive {
     if (isOwed) this.stop(); // pressed while the socket was down: sent now
     else this.changed();
     return isStopped;
+  }
+
+  /**
+   * Note the time of a STOP. The time of a STOP before this page's connection is unknown.
+   *
+   * @param {Lease} lease the new lease
+   * @param {boolean} isStopped whether STOP was pressed since the last lease
+   */
+  witness(lease, isStopped) {
+    if (!lease.latched) this.latchedAtMs = null;
+    else if (isStopped) this.latchedAtMs = this.lease === null ? null : Date.now();
   }
 
   /**
