@@ -234,18 +234,18 @@ def _about(setting: Setting) -> str:
     parts = [setting.description.rstrip(".")] if setting.description else []
     low, high = setting.min, setting.max
     if setting.type == "port":
-        parts.append(t("a port, 1 to 65535"))
+        parts.append(t("A port, 1 to 65535"))
     elif setting.type == "host":
-        parts.append(t("a name or an address, such as 192.168.1.20"))
+        parts.append(t("A name or an address, such as 192.168.1.20"))
     elif setting.type == "path":
-        parts.append(t("the full path of a file on the machine that runs URC"))
+        parts.append(t("The full path of a file on the machine that runs URC"))
     elif low is not None and high is not None:
-        parts.append(t("{low} to {high}", low=f"{low:.15g}", high=f"{high:.15g}"))
+        parts.append(t("From {low} to {high}", low=f"{low:.15g}", high=f"{high:.15g}"))
     elif low is not None:
-        parts.append(t("at least {low}", low=f"{low:.15g}"))
+        parts.append(t("At least {low}", low=f"{low:.15g}"))
     elif high is not None:
-        parts.append(t("at most {high}", high=f"{high:.15g}"))
-    return "; ".join(parts)
+        parts.append(t("At most {high}", high=f"{high:.15g}"))
+    return ". ".join(parts)
 
 
 def _text(value: Value) -> str:

@@ -51,7 +51,7 @@ async function look(form, next) {
   next.hidden = true;
   if (host === "") return tell("[data-said]", `▲ ${t("Enter the address of the robot.")}`, true);
   if (port !== "" && !(/^\d+$/.test(port) && Number(port) >= 1 && Number(port) <= 65535)) {
-    return tell("[data-said]", `▲ ${t("Port of the bridge")}: ${t("a port, 1 to 65535")}`, true);
+    return tell("[data-said]", `▲ ${t("Port of the bridge")}. ${t("A port, 1 to 65535")}`, true);
   }
   lock(form, true);
   tell("[data-said]", t("looking for topics …"));

@@ -43,6 +43,7 @@ const said = part(root, "[data-said]");
 const found = part(root, "[data-found]");
 const tester = form.querySelector("[data-test]");
 const plain = form.querySelector("[data-plain]");
+const hint = form.querySelector("[data-save-hint]");
 /** Secrets to delete. @type {Set<string>} */
 const forgotten = new Set();
 /** Saved values since the page was loaded. @type {Map<Element, string>} */
@@ -88,7 +89,11 @@ function isChanged() {
 /** Offer to save only what has changed; a test is possible at any time. */
 function offer() {
   const hasChange = isChanged();
-  if (plain instanceof HTMLButtonElement) plain.disabled = isBusy || !hasChange;
+  if (plain instanceof HTMLButtonElement) {
+    plain.disabled = isBusy;
+    plain.hidden = !hasChange;
+  }
+  if (hint instanceof HTMLElement) hint.hidden = !hasChange;
   if (!(tester instanceof HTMLButtonElement)) return;
   tester.disabled = isBusy;
   tester.textContent = hasChange ? t("Test & save") : t("Test connection");
