@@ -224,7 +224,7 @@ class Panorama {
     if (!globalThis.isSecureContext || !Tilt || !matchMedia("(pointer: coarse)").matches) return;
     /** @type {AbortController | null} */
     let end = null;
-    const button = this.addButton("⟲", this.t("Look around by tilting"), async () => {
+    const button = this.addButton(this.t("Tilt"), this.t("Look around by tilting"), async () => {
       if (end) {
         end.abort();
         end = null;

@@ -19,7 +19,7 @@ const VIEWS = /** @type {const} */ (["follow", "top", "orbit"]);
  * @param {string} text
  */
 const mark = (text) => text;
-const NAMES = { follow: mark("Follow"), top: mark("From above"), orbit: mark("Around") };
+const NAMES = { follow: mark("Follow"), top: mark("From above"), orbit: mark("Free view") };
 const KEYS = {
   ArrowLeft: [-STEP, 0, 1],
   ArrowRight: [STEP, 0, 1],

@@ -42,7 +42,7 @@ export class AlarmSheet {
     /** Opened bursts. @type {Set<number>} */
     this.opened = new Set();
     this.title = made("h2", { class: "urc-alarm-title", tabindex: "-1" }, t("Alarms"));
-    this.order = this.button(t("First-out"), "order", () => {
+    this.order = this.button(t("Oldest first"), "order", () => {
       this.isFirstOut = !this.isFirstOut;
       attribute(this.order, "aria-pressed", String(this.isFirstOut));
       this.drawn = "";

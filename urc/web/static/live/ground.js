@@ -46,7 +46,9 @@ function addButton(view, views) {
   button.className = "urc-swap";
   button.textContent = "⤢";
   button.setAttribute("aria-keyshortcuts", "V");
-  button.setAttribute("aria-label", t("Show {title} large", { title: titleOf(view) }));
+  const label = t("Show {title} large", { title: titleOf(view) });
+  button.setAttribute("aria-label", label);
+  button.title = label;
   button.addEventListener("click", () => {
     const ground = views.find((one) => one.dataset["place"] === "ground");
     if (!ground || ground === view) return;

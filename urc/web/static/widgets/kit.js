@@ -218,7 +218,10 @@ export function button(className, text, press, { signal, label = "" }) {
   made.type = "button";
   made.className = className;
   made.textContent = text;
-  if (label) made.setAttribute("aria-label", label);
+  if (label) {
+    made.setAttribute("aria-label", label);
+    made.title = label;
+  }
   made.addEventListener("click", press, { signal });
   return made;
 }
