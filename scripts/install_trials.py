@@ -64,7 +64,7 @@ TRIALS = (
     Trial("pip, extra `all`", _pip("[all]"), "v/bin/urc", "v/lib"),
     Trial(
         "pipx, extra `demo`",
-        f"pipx install --pip-args '--no-index --find-links wheels' '{_FILE}'",
+        f"pipx install --pip-args \"--no-index --find-links $PWD/wheels\" '{_FILE}'",
         ".local/bin/urc",
         ".local/pipx .local/share/pipx",
         prepare="apt-get update -qq && apt-get install -y -qq --no-install-recommends pipx",
