@@ -11,8 +11,9 @@ from urc.transports.base import GoalRecord
 
 __all__ = ["GoalAnswer", "GoalReports"]
 
-GoalAnswer = Literal["unsent", "owed", "answered"]
-"""State of a cancellation: not reported yet, not answered yet, or answered."""
+GoalAnswer = Literal["unsent", "owed", "dropped", "answered"]
+"""State of a cancellation: not reported yet, not answered yet, ended without an answer, or
+answered."""
 
 
 class GoalReports:
@@ -51,4 +52,15 @@ class GoalReports:
         if self._owed.get((line, action), 0) <= since:
             return "unsent"
         record = self._records[line]
-        return "owed" if action in record.owed else "answered"
+        if action in record.owed:
+            return "owed"
+        return "dropped" if action in record.dropped else "answered"
+
+    def end(self) -> list[str]:
+        """Take all unanswered cancellations as dropped; return the transports that have any."""
+        lines = [line for line, record in self._records.items() if record.owed]
+        for line in lines:
+            record = self._records[line]
+            dropped = dict.fromkeys((*record.dropped, *record.owed))
+            self.changed(line, record._replace(owed=(), dropped=tuple(dropped)))
+        return lines

@@ -246,6 +246,11 @@ class GuardClient:
         if control is not None:
             control.counted = None
 
+    def end_cancellations(self) -> None:
+        """End unanswered cancellations of all goals, also in a guard that starts later."""
+        for line in self.goals.end():
+            self.channel.post(messages.EndCancellations(line))
+
     # -- the guard: `ChannelListener`
 
     @property

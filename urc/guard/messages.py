@@ -161,6 +161,12 @@ class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
     stops: tuple[Numbered, ...] = ()
 
 
+class EndCancellations(msgspec.Struct, array_like=True, frozen=True, tag=12):
+    """End a transport's unanswered cancellations of all goals, because STOP was reset."""
+
+    line: str
+
+
 class LineOpened(msgspec.Struct, array_like=True, frozen=True, tag=21):
     """A connection was opened."""
 
@@ -290,6 +296,7 @@ ToGuard = (
     | ReplaceStop
     | StopMotion
     | RecoverStop
+    | EndCancellations
 )
 FromGuard = (
     LineOpened

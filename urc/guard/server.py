@@ -48,6 +48,7 @@ class GuardServer:
             messages.MakeTransport: self._make,
             messages.ReplaceStop: self._renew,
             messages.RecoverStop: self._owe,
+            messages.EndCancellations: self._end_cancellations,
         }
 
     def handle(self, said: messages.ToGuard) -> None:
@@ -117,6 +118,11 @@ class GuardServer:
             line.scheduler.stop(control, terms)
             self._stirred.add(line)
         self.settle()  # before other messages that arrived with it
+
+    def _end_cancellations(self, said: messages.EndCancellations) -> None:
+        transport = self._lines[said.line].transport
+        if isinstance(transport, SupportsGoals):
+            transport.end_cancellations()
 
     def _owe(self, said: messages.RecoverStop) -> None:
         line = self._controls[said.control] = self._lines[said.line]

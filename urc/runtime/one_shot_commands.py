@@ -217,7 +217,8 @@ class OneShotCommands:
     async def _await_answers(self, session: Drivable, asked: dict[str, _Cancellation]) -> None:
         """Wait until the robot has answered the cancellations; the transport repeats them.
 
-        Return early if a cancellation has not left URC in time; its command is then owed again.
+        Return early if a cancellation has not left URC in time, or has ended without an answer; its
+        command is then owed again.
 
         Args:
             session: the session that has sent the cancellations.
@@ -234,7 +235,7 @@ class OneShotCommands:
                 if answer == "answered":
                     del asked[command]
                     self._controller().answered(command)
-                elif answer == "unsent" and self._clock.now() > until_s:
+                elif answer == "dropped" or (answer == "unsent" and self._clock.now() > until_s):
                     del asked[command]
                     self._controller().owe_unanswered((command,))
             if self._controller().owed:

@@ -189,6 +189,7 @@ class Session:
             self._goals = GoalReports(known)
             for name, one in known.items():
                 one.keep_goals(GoalRecord(), partial(self._goals.changed, name))
+        self._transports = transports
         links = {
             name: Link(
                 spec,
@@ -357,7 +358,19 @@ class Session:
             reason: reason to display; "" permits autonomous motion again.
         """
         self._stops += reason != ""
+        if not reason:
+            self._end_cancellations()
         self._dispatcher.latch(reason)
+
+    def _end_cancellations(self) -> None:
+        """End unanswered cancellations of all goals, which would also end new goals."""
+        if self.backend is not None:
+            self.backend.end_cancellations()
+            return
+        for line in self._goals.end():
+            transport = self._transports[line]
+            if isinstance(transport, SupportsGoals):
+                transport.end_cancellations()
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
         """Wait, within a time limit, until the first attempt of a command's links has ended.

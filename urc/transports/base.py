@@ -265,6 +265,8 @@ class GoalRecord(NamedTuple):
     """Id and action of each unfinished goal, oldest first, and whether it was cancelled."""
     owed: tuple[str, ...] = ()
     """Actions that owe an answer to the cancellation of all goals, oldest first."""
+    dropped: tuple[str, ...] = ()
+    """Actions whose last cancellation of all goals has ended without an answer, oldest first."""
 
 
 @runtime_checkable
@@ -278,6 +280,13 @@ class SupportsGoals(Protocol):
             record: the goals of the earlier process.
             changed: function that receives the whole record after each change. A new goal is
                 reported before it is sent.
+        """
+
+    def end_cancellations(self) -> None:
+        """End the repetition of all unanswered cancellations of all goals; never raises.
+
+        A later reset of STOP permits new goals, which such a cancellation would end, too. Goals
+        that were cancelled by their ids are still cancelled.
         """
 
 

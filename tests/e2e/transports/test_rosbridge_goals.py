@@ -364,6 +364,49 @@ async def test_a_cancellation_without_an_answer_delays_neither_stops_nor_a_new_g
             assert session.hub.links["ros"].state == "live"
 
 
+@pytest.mark.parametrize("motion", ["none", "guarded"])
+async def test_a_reset_ends_unanswered_cancellations_of_all_goals(
+    tmp_path: Path, motion: Motion
+) -> None:
+    """On later connections too; each of them would end a new goal, whoever has sent it."""
+    path = tmp_path / "rover.yaml"
+    path.write_text(GUARDED)
+    rover = load_profile(path, built_in_catalog())
+    async with (
+        nothing_left(),
+        emulated(rover) as port,
+        one_by_one(port) as (bridge, blocked),
+        cable(bridge) as (near, cut),
+    ):
+        settings = {"host": "127.0.0.1", "port": near}
+        transports = built_in_catalog().transports
+        async with Session(rover, settings, transports, motion=motion) as session:
+            await until(session, lambda: value(session, "going") is False)
+            since = session.goals.number
+            session.latch("Stopped by a test")
+            await session.command("stop_docking", {})
+            await holds(lambda: bool(blocked))
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            session.latch("")
+            assert session.goals.answer("ros", "/dock", since) == "dropped", "no answer came"
+            await asyncio.sleep(0.3)
+            count = len(blocked)
+            cut()
+            await until(session, lambda: session.hub.links["ros"].state != "live")
+            await until(session, lambda: session.hub.links["ros"].state == "live")
+            docking = asyncio.create_task(session.command("dock", {}))
+            await until(session, lambda: value(session, "going") is True)
+            await asyncio.sleep(2.5)
+            assert len(blocked) == count
+            assert value(session, "going") is True
+            async with connect(f"ws://127.0.0.1:{port}") as late:
+                service = "/dock/_action/cancel_goal"
+                call = {"op": "call_service", "service": service, "args": {}}
+                await late.send(json.dumps(call))
+                with pytest.raises(CommandFailed, match="such as that of STOP, late"):
+                    await docking
+
+
 @asynccontextmanager
 async def one_by_one(port: int) -> AsyncIterator[tuple[int, list[str]]]:
     """Stand before a bridge that never answers a cancellation, and then reads nothing more.

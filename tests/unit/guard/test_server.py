@@ -90,6 +90,9 @@ class GoalWire(CountedWire):
     def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
         self.kept, self.changed = record, changed
 
+    def end_cancellations(self) -> None:
+        self.kept = self.kept._replace(owed=(), dropped=self.kept.owed)
+
     @staticmethod
     def make(setup: TransportSetup) -> "GoalWire":
         robot = GoalWire()
@@ -109,6 +112,8 @@ def test_goals_are_handed_to_the_guard_and_their_changes_reported() -> None:
     after = GoalRecord((("a1", "/dock", True), ("b2", "/dock", False)))
     robot.changed(after)
     assert said == [messages.GoalsChanged("wire", after)]
+    host.handle(messages.EndCancellations("wire"))
+    assert (robot.kept.owed, robot.kept.dropped) == ((), ("/dock",))
 
 
 async def test_nothing_is_taken_at_the_end() -> None:

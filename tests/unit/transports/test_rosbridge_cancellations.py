@@ -16,6 +16,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from urc.model.payload import Payload
 from urc.transports.ros import rosbridge_cancellations
+from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.rosbridge_cancellations import ActionCancellations
 
 pytestmark = pytest.mark.anyio
@@ -153,7 +154,10 @@ async def cancelled(
         answers.append((action, is_cancelling))
         return True
 
-    work = ActionCancellations(bridge.connect, lambda action: not answers, answered, told.append)
+    goals = UnfinishedGoals()
+    work = ActionCancellations(
+        bridge.connect, lambda action: not answers, answered, told.append, goals
+    )
     work.begin("/dock")
     try:
         end_s = time.monotonic() + 10

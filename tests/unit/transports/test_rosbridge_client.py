@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 
 from urc.model.payload import Envelope
 from urc.transports.base import GoalRecord, PeerClosed
-from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
+from urc.transports.ros.goals import LATE, MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.rosbridge_client import RosClient
 from urc.transports.topic_queue import TopicReceiveQueue
 
@@ -227,3 +228,61 @@ def test_the_status_of_a_goal_counts_more_than_its_result(status: int, reason: s
     assert response.attributes["ok"] == (reason is None)
     expected = None if reason is None else f"the action was {reason}"
     assert response.attributes.get("reason") == expected
+
+
+def test_a_new_goal_ends_the_cancellation_of_all_goals_without_an_answer() -> None:
+    """Nothing proves the end of the earlier goals, so they do not count as ended."""
+    told: list[GoalRecord] = []
+    goals = UnfinishedGoals()
+    goals.keep(GoalRecord(), told.append)
+    client = RosClient(TopicReceiveQueue(), 2, goals)
+    sent(client, CANCEL)
+    sent(client, DOCK)
+    assert (told[-1].owed, told[-1].dropped) == ((), ("/dock",))
+    sent(client, CANCEL)
+    assert (told[-1].owed, told[-1].dropped) == (("/dock",), ())
+    client.arrived(ended({"id": goals.cancelled()[0][0]}, 5), 100)
+    assert client.all_cancelled("/dock", False)
+    assert (told[-1].owed, told[-1].dropped) == ((), ())
+
+
+def late(prepare: Callable[[RosClient, UnfinishedGoals], None], status: int = 5) -> object:
+    """Return why a goal has ended that was sent after `prepare`."""
+    goals = UnfinishedGoals()
+    client = RosClient(queue := TopicReceiveQueue(), 2, goals)
+    prepare(client, goals)
+    (goal,) = sent(client, DOCK)
+    client.arrived(ended(goal, status), 100)
+    (response,) = told(queue)
+    return response.attributes.get("reason")
+
+
+def unanswered(client: RosClient, goals: UnfinishedGoals) -> None:
+    """Cancel all goals of /dock by a call whose reply has not arrived."""
+    sent(client, CANCEL)
+    goals.called("/dock")
+
+
+def answered(client: RosClient, goals: UnfinishedGoals) -> None:
+    """Cancel all goals of /dock by a call that the robot answers."""
+    unanswered(client, goals)
+    goals.replied("/dock")
+
+
+def test_a_goal_that_a_late_cancellation_may_have_ended_says_so() -> None:
+    """The bridge can handle an unanswered call late, and then it ends newer goals, too."""
+    assert late(unanswered) == LATE
+    assert late(answered) == "the action was cancelled"
+    assert late(unanswered, 6) == "the action was aborted"
+    assert late(lambda client, goals: goals.called("/undock")) == "the action was cancelled"
+
+
+def test_a_goal_that_the_operator_cancels_is_not_called_a_late_end() -> None:
+    goals = UnfinishedGoals()
+    client = RosClient(queue := TopicReceiveQueue(), 2, goals)
+    unanswered(client, goals)
+    (goal,) = sent(client, DOCK)
+    sent(client, CANCEL)
+    client.arrived(ended(goal, 5), 100)
+    (response,) = told(queue)
+    assert response.attributes["reason"] == "the action was cancelled"

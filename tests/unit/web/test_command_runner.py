@@ -298,6 +298,21 @@ async def test_a_route_with_an_unknown_outcome_stays_until_another_page_ends_it(
         assert await goals(robot, other) == []
 
 
+async def test_a_cancellation_that_a_newer_goal_ends_does_not_end_a_lost_route() -> None:
+    async with driven() as (robot, _, screens):
+        line = await screens.come()
+        line.say(ROUTE)
+        await settle()
+        robot.ways[0].set_exception(CommandFailed("disconnected", "the connection is lost"))
+        line.say({"t": "run", "id": 7, "command": "end"})
+        await settle()
+        robot.goals.changed("wire", GoalRecord(owed=("/follow",)))
+        await robot.fake.advance(1)
+        robot.goals.changed("wire", GoalRecord(dropped=("/follow",)))
+        await robot.fake.advance(1)
+        assert [one["lost"] for one in await goals(robot, line)] == [True]
+
+
 async def test_a_session_without_pages_follows_a_route_to_its_end() -> None:
     async with driven() as (robot, service, screens):
         first = await screens.come()

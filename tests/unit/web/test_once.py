@@ -242,6 +242,23 @@ async def test_a_cancellation_that_never_left_is_sent_again_and_not_confirmed() 
         assert confirmed(it.line)
 
 
+async def test_a_cancellation_that_a_goal_has_ended_is_sent_again_while_stop_is_latched() -> None:
+    """A goal that moves nothing may be sent then; it must not confirm STOP."""
+    async with scene(commands=FOLD | ABANDON) as it:
+        it.robot.payloads["abandon"] = GOALS
+        it.robot.on_command = lambda name, _: report(it.robot, "/dock")
+        it.line.say({"t": "stop"})
+        await it.clock.advance(2)
+        assert len(it.robot.commands) == 1
+        it.robot.goals.changed("wire", GoalRecord(dropped=("/dock",)))
+        await it.clock.advance(2)
+        assert [name for name, _ in it.robot.commands] == ["abandon"] * 2
+        assert not confirmed(it.line)
+        report(it.robot)
+        await it.clock.advance(0.2)
+        assert confirmed(it.line)
+
+
 @pytest.mark.parametrize("is_reset", [False, True])
 async def test_an_unanswered_cancellation_is_sent_again_in_the_next_session_of_a_latched_stop(
     is_reset: bool,

@@ -436,7 +436,12 @@ class TopicCodec:
 
 _AnySource = _Source | ProtobufReader | FlatbufferReader
 _AnyWriter = Writer | ProtobufWriter
-_OUTCOMES: Final = {4: "", 5: "the action was cancelled", 6: "the action was aborted"}
+_CANCELLED: Final = 5
+_OUTCOMES: Final = {
+    4: "",
+    _CANCELLED: "the action was cancelled",
+    6: "the action was aborted",
+}
 """Outcome of each status of a goal that has ended (action_msgs/msg/GoalStatus)."""
 _NO_STATUS: Final = "the bridge sent a result without a status"
 _FEEDBACK: Final = "_FeedbackMessage"
@@ -448,6 +453,8 @@ def _result(said: Envelope, *, is_nested: bool) -> Envelope:
     body = said.body if isinstance(said.body, Mapping) else {}
     status = body.get("status")
     reason = _OUTCOMES.get(status, "the action failed") if isinstance(status, int) else _NO_STATUS
+    if status == _CANCELLED:
+        reason = str(said.attributes.get("why_cancelled") or reason)
     attributes: dict[str, object] = {
         "id": said.attributes.get("id"),
         "ok": not reason,

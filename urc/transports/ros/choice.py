@@ -65,6 +65,7 @@ class _Bridge(Protocol):
     async def probe(self) -> None: ...
     def arrivals(self) -> int: ...
     def unsent(self) -> int: ...
+    def end_cancellations(self) -> None: ...
 
 
 class Candidate:
@@ -123,6 +124,13 @@ class AnyBridgeTransport:
     def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
+
+    def end_cancellations(self) -> None:
+        """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
+        if self._bridge is not None:
+            self._bridge.end_cancellations()
+        for action in self._goals.owed():
+            self._goals.drop(action)
 
     async def open(self, timeout_s: float) -> None:
         """Connect to a bridge within `timeout_s` seconds, or raise `ConnectFailed`."""

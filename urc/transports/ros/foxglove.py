@@ -89,6 +89,13 @@ class FoxgloveTransport:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
 
+    def end_cancellations(self) -> None:
+        """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
+        for action in self._goals.owed():
+            if self._session is not None:
+                self._session.drop_cancellation(action)
+            self._goals.drop(action)
+
     async def open(self, timeout_s: float) -> None:
         """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()

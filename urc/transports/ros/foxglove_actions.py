@@ -120,7 +120,7 @@ class FoxgloveActions:
         if action is None:
             self._calls.answer(number, _CANCELLED)
             return
-        self._cancellations.superseded(action)
+        self._cancellations.drop(action)
         self._cancellations.sent(goal, action)
         self._goals.add(goal, action)
         self._calls.call(service, data, lambda *reply: self._replied(goal, action, number, *reply))
@@ -146,9 +146,11 @@ class FoxgloveActions:
         attributes = {"id": number, "result_of": goal}
         self._calls.return_unencoded(service, attributes, body)
 
-    def ended(self, goal: str) -> None:
-        """Forget a goal whose result has arrived."""
+    def ended(self, goal: str) -> str:
+        """Forget a goal whose result has arrived; return the reason if it ended as cancelled."""
+        why_cancelled = self._goals.why_cancelled(goal)
         self._cancellations.ended(goal)
+        return why_cancelled
 
     # -- cancelling
 
@@ -156,6 +158,10 @@ class FoxgloveActions:
         """Cancel all goals of an action, and never send those that are being encoded."""
         self._unsent = {goal: name for goal, name in self._unsent.items() if name != action}
         self._cancellations.cancel(action)
+
+    def drop_cancellation(self, action: str) -> None:
+        """End the cancellation of all goals of an action without an answer."""
+        self._cancellations.drop(action)
 
     def offered(self, name: str) -> None:
         """Send the unanswered cancellations of an action when its service appears.

@@ -125,9 +125,9 @@ class GoalCancellations:
         for key in [key for key in self._attempts if key[1] == goal]:
             self._drop(key)
 
-    def superseded(self, action: str) -> None:
-        """End the cancellation of all goals, because a new goal of the action is being sent."""
-        self._goals.settle(action)
+    def drop(self, action: str) -> None:
+        """End the cancellation of all goals without an answer, for a new goal of the action."""
+        self._goals.drop(action)
         self._drop((action, _ALL))
 
     # -- cancelling
@@ -170,6 +170,8 @@ class GoalCancellations:
         if not is_ros_id(goal):  # from rosbridge; ended by the cancellation of all goals
             return
         attempt = self._attempts[key] = _Attempt(action, goal, wait_s)
+        if goal == _ALL:
+            self._goals.called(action)
         data = _cancellation(service, bytes.fromhex(goal))
         attempt.call = self._calls.call(
             service, data, lambda *reply: self._answered(attempt, *reply)
@@ -200,6 +202,8 @@ class GoalCancellations:
     def _answered(self, attempt: _Attempt, reply: ServiceReply | None, fault: str) -> None:
         """Handle the robot's reply to a cancellation."""
         attempt.is_answered = True
+        if attempt.goal == _ALL and reply is not None:
+            self._goals.replied(attempt.action)
         code = -1 if reply is None else first_value(reply, "return_code")
         if not _ACCEPTED <= code <= _TERMINATED:
             self._tell_failure(attempt, fault or _INVALID)
@@ -207,7 +211,8 @@ class GoalCancellations:
             self._tell_refusal(attempt)
         elif attempt.goal == _ALL:
             if not self._is_followed(attempt.action, reply):
-                self.superseded(attempt.action)
+                self._goals.settle(attempt.action)
+                self._drop((attempt.action, _ALL))
         elif reply is not None and code == _ACCEPTED and not _cancels(reply):
             self._tell_refusal(attempt)  # rclpy reports a refusal like this
         elif attempt.goal in self._awaited:

@@ -337,12 +337,11 @@ class FoxgloveSession:
             return
         number, service = self._calls.pop(said.call, (None, ""))
         goal = self._results.pop(said.call, "")
-        if goal:
-            self._actions.ended(goal)
+        why_cancelled = self._actions.ended(goal) if goal else ""
         if service:
             attributes = {"id": number, "ok": True, "service": service, "encoding": said.encoding}
             if goal:
-                attributes["result_of"] = goal
+                attributes |= {"result_of": goal, "why_cancelled": why_cancelled}
             self.queue.answer(Envelope("response", attributes, said.data), len(said.data))
 
     def _call_failed(self, said: Mapping[str, Any]) -> None:
@@ -441,6 +440,10 @@ class FoxgloveSession:
             self.reconcile()
         else:
             raise TransportError(f"this connection cannot {envelope.verb}")
+
+    def drop_cancellation(self, action: str) -> None:
+        """End the cancellation of all goals of an action without an answer."""
+        self._actions.drop_cancellation(action)
 
     def _list_topics(self, request: Envelope) -> None:
         """Answer a request for topics, unless URC publishes."""

@@ -6,7 +6,10 @@ must also cancel a goal that was sent before a loss.
 
 The record also keeps the actions of which all goals are to be cancelled. The robot *owes* an answer
 to this cancellation. The cancellation is repeated, on later connections too, until the answer
-arrives or a new goal of the action is sent.
+arrives. It is *dropped* without an answer when a new goal of the action is sent, or STOP is reset.
+
+The robot can receive a cancellation of all goals late, and then it also ends newer goals. The
+record therefore keeps the actions with a call that was not answered, and explains such an end.
 
 With ``via: auto``, goals of both kinds of bridges are in one record. A bridge can only cancel goals
 that were sent through its own kind of bridge by their ids.
@@ -18,12 +21,16 @@ from typing import Final
 
 from urc.transports.base import GoalRecord
 
-__all__ = ["FIRST_S", "MAX_GOALS", "UnfinishedGoals", "is_ros_id", "longer"]
+__all__ = ["FIRST_S", "LATE", "MAX_GOALS", "UnfinishedGoals", "is_ros_id", "longer"]
 
 MAX_GOALS: Final = 64
 """Maximum number of kept goals, and of actions; above the limit, the oldest one is dropped."""
 FIRST_S: Final = 1.0
 """Time after which an unanswered cancellation is first repeated, in seconds."""
+LATE: Final = (
+    "the action was cancelled: the robot may have received an earlier cancellation of all goals,"
+    " such as that of STOP, late"
+)
 _LONGEST_S: Final = 10.0
 _ROS_ID: Final = re.compile("[0-9a-f]{32}")
 
@@ -52,13 +59,19 @@ class UnfinishedGoals:
         """Ids of the goals for which a cancellation was sent."""
         self._owed: dict[str, None] = {}
         """Actions whose cancellation of all goals has not been answered, oldest first."""
+        self._dropped: dict[str, None] = {}
+        """Actions whose cancellation of all goals has ended without an answer, oldest first."""
+        self._called: dict[str, None] = {}
+        """Actions with an unanswered call that cancels all goals, oldest first."""
+        self._doubted: set[str] = set()
+        """Goals that were sent after such a call of their action."""
         self._changed: Callable[[GoalRecord], None] | None = None
 
     @property
     def record(self) -> GoalRecord:
         """The whole record."""
         goals = tuple((one, name, one in self._cancelled) for one, name in self._actions.items())
-        return GoalRecord(goals, tuple(self._owed))
+        return GoalRecord(goals, tuple(self._owed), tuple(self._dropped))
 
     def keep(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
         """Add the goals of an earlier process, and call `changed` after each later change."""
@@ -67,6 +80,7 @@ class UnfinishedGoals:
             if is_cancelled:
                 self._cancelled.add(goal)
         self._owed.update(dict.fromkeys(record.owed[:MAX_GOALS]))
+        self._dropped.update(dict.fromkeys(record.dropped[:MAX_GOALS]))
         self._changed = changed
 
     def _report(self) -> None:
@@ -78,6 +92,8 @@ class UnfinishedGoals:
         while len(self._actions) >= MAX_GOALS:
             self._forget(next(iter(self._actions)))
         self._actions[goal] = action
+        if action in self._called:
+            self._doubted.add(goal)
         self._report()
 
     def finish(self, goal: str) -> None:
@@ -89,6 +105,7 @@ class UnfinishedGoals:
     def _forget(self, goal: str) -> None:
         self._actions.pop(goal, None)
         self._cancelled.discard(goal)
+        self._doubted.discard(goal)
 
     def cancel(self, action: str) -> list[str]:
         """Mark an action's goals as cancelled, and the action as owing the cancellation of all.
@@ -98,10 +115,8 @@ class UnfinishedGoals:
         """
         goals = [goal for goal, name in self._actions.items() if name == action]
         self._cancelled.update(goals)
-        self._owed.pop(action, None)
-        while len(self._owed) >= MAX_GOALS:
-            del self._owed[next(iter(self._owed))]
-        self._owed[action] = None
+        _append(self._owed, action)
+        self._dropped.pop(action, None)
         self._report()
         return goals
 
@@ -135,7 +150,36 @@ class UnfinishedGoals:
         return list(self._owed)
 
     def settle(self, action: str) -> None:
-        """Forget the cancellation of all goals: it was answered, or a new goal is being sent."""
+        """Forget the cancellation of all goals, because it was answered."""
         if action in self._owed:
             del self._owed[action]
             self._report()
+
+    def drop(self, action: str) -> None:
+        """End the cancellation of all goals without an answer: a new goal is permitted."""
+        if action in self._owed:
+            del self._owed[action]
+            _append(self._dropped, action)
+            self._report()
+
+    def called(self, action: str) -> None:
+        """Note that a cancellation of all goals is being sent, which the robot may handle late."""
+        _append(self._called, action)
+
+    def replied(self, action: str) -> None:
+        """Note that the robot has handled the cancellation of all goals."""
+        self._called.pop(action, None)
+
+    def why_cancelled(self, goal: str) -> str:
+        """Return why a goal may have ended as cancelled; "" if nothing is known."""
+        if goal not in self._doubted or goal in self._cancelled:
+            return ""
+        return LATE
+
+
+def _append(found: dict[str, None], action: str) -> None:
+    """Add an action as the newest; above the limit, drop the oldest."""
+    found.pop(action, None)
+    while len(found) >= MAX_GOALS:
+        del found[next(iter(found))]
+    found[action] = None

@@ -116,6 +116,13 @@ class RosbridgeTransport:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
 
+    def end_cancellations(self) -> None:
+        """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
+        for action in self._goals.owed():
+            if self._session is not None:
+                self._session.drop_cancellation(action)
+            self._goals.drop(action)
+
     async def open(self, timeout_s: float) -> None:
         """Connect and subscribe within `timeout_s` seconds, or raise `ConnectFailed`."""
         await self.close()
@@ -285,7 +292,8 @@ class _Session:
         self._all: ActionCancellations | None = None
         if spare is not None and ros != 1:
             client = self._client
-            self._all = ActionCancellations(spare, client.owes, client.all_cancelled, self._tell)
+            answered = client.all_cancelled
+            self._all = ActionCancellations(spare, client.owes, answered, self._tell, goals)
         self._is_auto = ros == AUTO
         self._frames = OperationReader(packed)
         self._packed = packed
@@ -354,6 +362,12 @@ class _Session:
         """Cancel all goals of an action, also those that URC does not know."""
         if self._all is not None:
             self._all.begin(action)
+
+    def drop_cancellation(self, action: str) -> None:
+        """End the cancellation of all goals of an action without an answer."""
+        self._client.drop(action)
+        if self._all is not None:
+            self._all.drop(action)
 
     def _tell(self, text: str) -> None:
         """Write a line to the robot's log, once per connection."""

@@ -31,7 +31,7 @@ from typing import Any, Final, Protocol
 from urc.model.payload import Payload
 from urc.transports._faults import one_line
 from urc.transports.base import TransportError
-from urc.transports.ros.goals import FIRST_S, longer
+from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, longer
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader, encode_operation
 
 __all__ = ["CANCEL_GOAL", "STATUS", "CancelWire", "ActionCancellations"]
@@ -80,6 +80,7 @@ class ActionCancellations:
         owes: Callable[[str], bool],
         answered: Callable[[str, bool], bool],
         tell: Callable[[str], None],
+        goals: UnfinishedGoals,
     ) -> None:
         """Prepare without connecting.
 
@@ -89,11 +90,13 @@ class ActionCancellations:
             answered: function that takes an action, and whether the robot has listed goals that it
                 now cancels. It returns False if the answer does not prove that all goals end.
             tell: function that writes a line to the robot's log.
+            goals: record that keeps which actions have an unanswered call.
         """
         self._wire = wire
         self._owes = owes
         self._answered = answered
         self._tell = tell
+        self._goals = goals
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._room = asyncio.Semaphore(MAX_AT_ONCE)
 
@@ -143,7 +146,10 @@ class ActionCancellations:
                 await bridge.open()
                 if not self._owes(action):
                     return ""
-                why_not, is_cancelling = _outcome(await bridge.call(action + CANCEL_GOAL, {}))
+                self._goals.called(action)
+                reply = await bridge.call(action + CANCEL_GOAL, {})
+                self._goals.replied(action)
+                why_not, is_cancelling = _outcome(reply)
                 if why_not:
                     return why_not
                 late = _GOES_ON

@@ -234,7 +234,7 @@ class RosClient:
             feedback=lambda values: self._feedback(name, number, values),
             errback=lambda result: self._result(goal, number, False, result),
         )
-        self._goals.settle(name)
+        self.drop(name)
         self._goals.add(goal, name)
         while len(self._own) >= MAX_PENDING:
             del self._own[next(iter(self._own))]
@@ -247,6 +247,11 @@ class RosClient:
         for goal in goals:
             self._cancel_goal(goal, name)
         self._all_cancelled.discard(name)
+
+    def drop(self, action: str) -> None:
+        """End the cancellation of all goals of an action without an answer."""
+        self._all_cancelled.discard(action)
+        self._goals.drop(action)
 
     def owes(self, action: str) -> bool:
         """Return whether the robot still owes the cancellation of all goals of an action."""
@@ -328,16 +333,18 @@ class RosClient:
         self._queue.answer(Envelope("feedback", attributes, dict(values)), self._size_bytes)
 
     def _result(self, goal: str, number: object, is_ok: bool, result: Any) -> None:
-        self._finish(goal)
         status, values = result["status"], result["values"]
+        why = self._goals.why_cancelled(goal) if status == _CANCELLED else ""
+        self._finish(goal)
         attributes = {"id": number, "ok": is_ok, "status": status}
         if not is_ok:
             said = one_line(values) if isinstance(values, str) else _OUTCOMES.get(status, "failed")
-            attributes["reason"] = f"the action was {said}" if said in _ENDS else said
+            attributes["reason"] = why or (f"the action was {said}" if said in _ENDS else said)
         self._queue.answer(Envelope("response", attributes, values), self._size_bytes)
 
 
-_OUTCOMES = {4: "succeeded", 5: "cancelled", 6: "aborted"}
+_CANCELLED = 5
+_OUTCOMES = {4: "succeeded", _CANCELLED: "cancelled", 6: "aborted"}
 _NOT_REACHED = (5, 6)
 _ENDS = frozenset(_OUTCOMES.values())
 

@@ -211,12 +211,14 @@ class CommandRunner:
     async def _settle(self, target: CommandTarget, line: str, action: str, since: int) -> None:
         """Drop the lost goals of an action after the robot has answered their cancellation.
 
-        Without an answer in time, they stay until STOP or a later cancellation.
+        Without an answer in time, or if a newer goal ends the cancellation, they stay.
         """
         end_s = self._clock.now() + SETTLE_S
         while self._clock.now() < end_s:
-            if target.goals.answer(line, action, since) == "answered":
+            answer = target.goals.answer(line, action, since)
+            if answer == "answered":
                 target.hub.settle_goals(action)
+            if answer in ("answered", "dropped"):
                 return
             await self._clock.sleep(LOOK_S)
 
