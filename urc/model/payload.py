@@ -51,8 +51,8 @@ class Envelope(NamedTuple):
 
 
 RESTARTED: Final = "restarted"
-"""The verb of an envelope that a ROS transport makes if the robot's simulated clock went back. The
-body is one line of text about it."""
+"""The verb of an envelope that a ROS transport makes if the robot's clock, which may be simulated,
+went back. The body is one line of text about it; "" if the step is not worth a line."""
 NUMBERED: Final = frozenset(("call", "goal", "request", "get"))
 """Verbs of requests. The ``response`` to a request has the request's ``id``."""
 

@@ -465,7 +465,9 @@ class Link:
             self._report.log("warning", "notice", str(data.body))
             return
         if isinstance(data, Envelope) and data.verb == RESTARTED:
-            self._report.log("info", "clock", str(data.body))
+            if data.body:
+                is_warning = data.attributes.get("level") == "warning"
+                self._report.log("warning" if is_warning else "info", "clock", str(data.body))
             self._dispatcher.receive(self._name, data, now, is_new=False)
             return
         if isinstance(data, Envelope) and data.verb == TOPICS:

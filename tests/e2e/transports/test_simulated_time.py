@@ -191,3 +191,30 @@ async def test_a_restarted_simulation_is_followed_at_once(file: Path) -> None:
             assert "the simulated clock went back by 8.000 s" in notes
     finally:
         rover.close()
+
+
+async def test_two_programs_that_publish_the_clock_do_not_fill_the_log(file: Path) -> None:
+    rover = FoxgloveRobot()
+    try:
+        async with (
+            urc.connect(urc.load(file), port=rover.port, line="foxglove") as robot,
+            asyncio.timeout(WAIT_S),
+        ):
+
+            def notes() -> list[str]:
+                return [line.text for line in robot.hub.notes if "clock went back" in line.text]
+
+            while not any("two programs publish /clock" in text for text in notes()):
+                for sec in (9, 2):
+                    _clock(rover, sec)
+                await asyncio.sleep(0.02)
+            for _ in range(50):
+                for sec in (9, 2):
+                    _clock(rover, sec)
+                await asyncio.sleep(0.01)
+            while value(robot, "frames") is None:  # all earlier messages have then arrived
+                _transform(rover, 3, 1.0)
+                await asyncio.sleep(0.05)
+            assert len(notes()) == 3
+    finally:
+        rover.close()

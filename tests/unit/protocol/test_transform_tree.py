@@ -16,6 +16,7 @@ from urc.protocol.values.transform_tree import (
     MAX_DEPTH,
     MAX_FRAMES,
     MAX_TRANSFORMS,
+    SET_BACK,
     NotConnected,
     TransformTree,
     tree_message,
@@ -198,6 +199,22 @@ def test_a_robot_whose_clock_was_set_back_is_followed() -> None:
     assert place(made, "map", "odom") == (3, 0)
     made.update({"transforms": [stamped("map", "odom", (4, 0, 0), sec=79)]}, 10.2 + CLOCK_JUMP_S)
     assert place(made, "map", "odom") == (4, 0)
+
+
+def test_a_clock_that_was_set_back_a_little_is_followed_after_some_messages() -> None:
+    """Single transforms that are overtaken stay ignored, however many there are."""
+    made = tree(stamped("map", "odom", (1, 0, 0), sec=100), now=10)
+    for number in range(2 * SET_BACK):
+        made.update({"transforms": [stamped("map", "odom", (2, 0, 0), sec=95)]}, 10.1)
+        newer = stamped("map", "odom", (1, 0, 0), sec=101 + number)
+        if number >= SET_BACK:
+            made.update({"transforms": [newer]}, 10.1)
+    assert place(made, "map", "odom") == (1, 0)
+    for number in range(SET_BACK):
+        assert place(made, "map", "odom") == (1, 0)
+        late = stamped("map", "odom", (3, 0, 0), sec=104 + number)
+        made.update({"transforms": [late]}, 10.2)
+    assert place(made, "map", "odom") == (3, 0)
 
 
 def test_the_names_of_ros_1_are_understood() -> None:

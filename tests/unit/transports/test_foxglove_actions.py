@@ -591,3 +591,19 @@ def test_a_reset_ends_the_cancellation_of_all_goals_but_not_that_of_known_goals(
     bridge.advance(60)
     assert {one for one, _ in bridge.cancelled()} == {goal}
     assert goals.record.dropped == ("/dock",)
+
+
+def test_a_goal_carries_the_robots_time_in_place_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The engine encodes goals, and the transport knows the time: it writes it into the bytes."""
+    text = "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time[] times"
+    monkeypatch.setitem(TEXTS, "send_goal", (text, "bool accepted"))
+    bridge = Bridge().offer()
+    robot_s = 4_000
+    bridge.session.arrived(struct.pack("<BQ", 2, robot_s * 10**9))
+    bridge.session.perform(DOCK._replace(body={"times": ["now", {"sec": 5, "nanosec": 6}, "now"]}))
+    bridge.encode()
+    ((_, _, data),) = bridge.sent()
+    count, first, _, second, third, last, _ = struct.unpack("<IIIIIII", data[20:])
+    assert (count, second, third) == (3, 5, 6)
+    assert first == last
+    assert robot_s <= first <= robot_s + 60

@@ -11,7 +11,7 @@ import pytest
 from urc.model.payload import Envelope
 from urc.transports.base import GoalRecord, PeerClosed
 from urc.transports.ros.goals import LATE, MAX_GOALS, UnfinishedGoals
-from urc.transports.ros.rosbridge_client import RosClient
+from urc.transports.ros.rosbridge_client import RosClient, RosSubscription
 from urc.transports.topic_queue import TopicReceiveQueue
 
 DOCK = Envelope("goal", {"action": "/dock", "type": "a/action/Dock", "id": 7}, {})
@@ -286,3 +286,19 @@ def test_a_goal_that_the_operator_cancels_is_not_called_a_late_end() -> None:
     client.arrived(ended(goal, 5), 100)
     (response,) = told(queue)
     assert response.attributes["reason"] == "the action was cancelled"
+
+
+def test_with_simulated_time_goals_and_calls_carry_it_instead_of_now() -> None:
+    """Otherwise, the bridge replaces the word; its own clock may not be the simulation's."""
+    route = {"poses": [{"header": {"stamp": "now"}}, {"header": {"stamp": "now"}}]}
+    goal = DOCK._replace(body=route)
+    call = Envelope("call", {"service": "/plan", "id": 8}, route)
+    for clock_only in (None, True):
+        client = RosClient(TopicReceiveQueue(), 2, clock_only=clock_only)
+        client.listen(RosSubscription("/clock", "rosgraph_msgs/msg/Clock"))
+        clock = {"clock": {"sec": 7, "nanosec": 8}}
+        client.arrived({"op": "publish", "topic": "/clock", "msg": clock}, 100)
+        stamp = "now" if clock_only is None else clock["clock"]
+        for envelope in (goal, call):
+            (said,) = sent(client, envelope)
+            assert said["args"] == {"poses": [{"header": {"stamp": stamp}}] * 2}

@@ -367,7 +367,7 @@ class TopicCodec:
         if found is None:
             return envelope
         writer, _, encoding = found
-        data = b"" if writer is None else writer.write(envelope.body).data
+        data, stamps = (b"", ()) if writer is None else writer.write(envelope.body)
         if (
             "goal" in envelope.attributes
             and envelope.body
@@ -375,7 +375,12 @@ class TopicCodec:
         ):
             data += b"\0"  # the member of an empty goal, which a bridge does not list
         return envelope._replace(
-            attributes={**envelope.attributes, "encoding": encoding, "data": data}
+            attributes={
+                **envelope.attributes,
+                "encoding": encoding,
+                "data": data,
+                "stamps": list(stamps),
+            }
         )
 
     # -- sent envelopes

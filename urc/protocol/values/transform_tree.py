@@ -3,7 +3,8 @@
 Pure. The tree keeps the newest transform of each frame, with the time of receipt and the robot's
 timestamp. It has no history: URC shows the present, so it needs neither interpolation nor a buffer.
 A transform that is older than the stored one is ignored, because two publishers may overtake each
-other. After a jump of the robot's clock by more than `CLOCK_JUMP_S`, it is accepted.
+other. It is accepted after a jump of the robot's clock by more than `CLOCK_JUMP_S`, and after a
+series of such transforms.
 
 Messages are untrusted. The number of frames, of transforms per message, and of frames in a chain
 is limited. A transform that would close a cycle is rejected when it arrives, so every search ends.
@@ -14,7 +15,7 @@ tf2's buffer.
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, TypeGuard
 
 from urc.expressions import quoted
 from urc.protocol.values.convert import BadValue, Unusable
@@ -42,6 +43,9 @@ CLOCK_JUMP_S: Final = 10.0
 """Difference between two timestamps beyond which the robot's clock was set, in seconds."""
 FORGET_S: Final = 60.0
 """Age after which a transform may be dropped if the tree is full, in seconds."""
+SET_BACK: Final = 5
+"""Number of late transforms in a row, each newer than the one before, after which the robot's clock
+was set back."""
 RIVAL_S: Final = 10.0
 """Time within which a frame that returns to its previous parent has two publishers, in seconds."""
 _FARTHEST_M: Final = 4e7
@@ -75,6 +79,10 @@ class StoredTransform(NamedTuple):
     """Time of the last change of the parent, in seconds."""
     has_rival: bool = False
     """Whether two publishers report different parents in turn."""
+    late: int = 0
+    """Number of late transforms in a row, each newer than the one before."""
+    late_stamp_s: float = -math.inf
+    """Timestamp of the last late transform, in seconds."""
 
 
 class TransformTree:
@@ -139,11 +147,14 @@ class TransformTree:
         if last is None or last.parent != parent:
             last = self._connect(child, parent, last, now)
         elif _is_late(stamp_s, last, now) and not is_static:
-            return
+            late = last.late + 1 if stamp_s > last.late_stamp_s else 1
+            last = self.links[child] = last._replace(late=late, late_stamp_s=stamp_s)
+            if late < SET_BACK:
+                return
         is_same = last.transform == values
         transform = last.transform if is_same else _checked(values, child)
         self.links[child] = last._replace(
-            transform=transform, time_s=now, stamp_s=stamp_s, is_static=is_static
+            transform=transform, time_s=now, stamp_s=stamp_s, is_static=is_static, late=0
         )
 
     def _connect(
@@ -304,7 +315,7 @@ def _stamp_of(header: Mapping[str, Any]) -> float | None:
     return None
 
 
-def _is_late(stamp_s: float | None, last: StoredTransform, now: float) -> bool:
+def _is_late(stamp_s: float | None, last: StoredTransform, now: float) -> TypeGuard[float]:
     """Return whether a transform is older than the stored one, and not from a changed clock."""
     if stamp_s is None or last.stamp_s is None or now - last.time_s >= CLOCK_JUMP_S:
         return False

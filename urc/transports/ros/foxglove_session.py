@@ -167,7 +167,7 @@ class FoxgloveSession:
             if isinstance(said, MessageData):
                 self._message(said)
             elif isinstance(said, TimeTold):
-                self._time.told(said.time_ns, time.time_ns())
+                self._take_time(said.time_ns)
             elif isinstance(said, ServiceReply):
                 self._reply(said)
             elif said is not None:
@@ -287,7 +287,7 @@ class FoxgloveSession:
         if one is None:
             return
         one.received += 1
-        self._time.told(said.time_ns, time.time_ns())
+        self._take_time(said.time_ns)
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
         if self._time.is_simulated and one.wish.topic == CLOCK_TOPIC:
@@ -308,6 +308,12 @@ class FoxgloveSession:
             return
         one.due_s = now_s + throttle_s
         self.queue.message(one.wish.topic, envelope, len(said.data))
+
+    def _take_time(self, robot_ns: int) -> None:
+        """Record the time of a message from the robot."""
+        stepped = self._time.told(robot_ns, time.time_ns())
+        if stepped is not None:
+            self.queue.answer(stepped)
 
     def _deliver_late(self, one: _Subscription) -> None:
         envelope, one.late = one.late, None
@@ -498,6 +504,8 @@ class FoxgloveSession:
             return
         if encoding == "json":
             data = message_json(envelope.body, self._time)
+        elif isinstance(stamps := said.get("stamps"), list) and stamps:
+            data = self._time.stamped(data, stamps, time.time_ns())
         if goal := said.get("goal"):
             self._actions.send(str(goal), number, service, data)
             return

@@ -189,8 +189,7 @@ class RosClient:
 
     def _publish(self, attributes: Mapping[str, object], body: object) -> None:
         name, kind = _text(attributes, "topic"), str(attributes.get("type") or "")
-        if self._time.is_simulated:
-            body = self._time.timed(body, time.time_ns())
+        body = self._timed(body)
         if not kind:  # the bridge can find the type if another client uses the topic
             operation = {"op": "publish", "topic": name, "msg": _fields(body)}
             self._protocol.send_ros_message(Message(operation))
@@ -209,6 +208,10 @@ class RosClient:
             self._topics[name] = topic
         topic.publish(_fields(body))
 
+    def _timed(self, body: object) -> object:
+        """Return a message with the simulated time; otherwise, the bridge replaces ``now``."""
+        return self._time.timed(body, time.time_ns()) if self._time.is_simulated else body
+
     def _call(self, attributes: Mapping[str, object], body: object) -> None:
         name, number = _text(attributes, "service"), attributes.get("id")
         service = self._services.get(name)
@@ -218,7 +221,7 @@ class RosClient:
             kind = spelled(str(attributes.get("type") or ""), "srv", self._ros_version)
             service = self._services[name] = Service(self._ros, name, kind)
         service.call(
-            _fields(body),
+            _fields(self._timed(body)),
             callback=lambda values: self._answer(number, True, dict(values)),
             errback=lambda values: self._answer(number, False, values),
         )
@@ -229,7 +232,7 @@ class RosClient:
         wants_feedback = attributes.get("feedback") is not False
         self._protocol.wants_feedback = wants_feedback
         goal: str = ActionClient(self._ros, name, kind, reconnect_on_close=False).send_goal(
-            Goal(_fields(body)),
+            Goal(_fields(self._timed(body))),
             resultback=lambda result: self._result(goal, number, True, result),
             feedback=lambda values: self._feedback(name, number, values),
             errback=lambda result: self._result(goal, number, False, result),

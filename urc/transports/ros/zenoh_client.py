@@ -295,7 +295,9 @@ class _RosNode:
         self.session.queue.note_arrival()
         sent_ns = source_time(told)
         if sent_ns is not None:
-            self._time.told(sent_ns, time.time_ns())
+            stepped = self._time.told(sent_ns, time.time_ns())
+            if stepped is not None:
+                self.session.queue.answer(stepped)
         if not self._is_wanted(one, kind):
             return
         one.received += 1
