@@ -268,6 +268,46 @@ def test_settings_are_checked_kept_and_used(tmp_path: Path) -> None:
         assert "10.0.0.8" in client.get("/robots/rover/settings").text
 
 
+ROS = """\
+settings:
+  host: { type: host, default: 127.0.0.1 }
+  fleet: { type: string, default: "" }
+  namespace: { type: string, default: "" }
+transports:
+  ros:
+    type: ros
+    host: "{{ settings.host }}"
+    namespace: "{{ settings.fleet }}/{{ settings.namespace }}"
+signals:
+  x: {}
+messages:
+  odom: { subscribe: { topic: odom, type: nav_msgs/Odometry }, json: { x: pose.pose.position.x } }
+"""
+
+
+def test_a_wrong_namespace_is_refused_even_without_a_test_of_the_connection(
+    tmp_path: Path,
+) -> None:
+    """The robot could not be connected with it; both settings in it are marked."""
+    install(Store(tmp_path / "packages"), package("driver", "rover", text=ROS))
+    file = SettingsStore(tmp_path / "robots", "rover")
+    words = "words of letters, digits and _, separated by /, such as fleet/robot1"
+    with served(tmp_path) as client:
+        for given in ("robot 1", "2fast", "a//b", "ß", "x-1"):
+            for more in ({}, {"anyway": True}):
+                wrong = send(client, settings={"namespace": given}, **more)
+                why = f"'/{given}' is not a ROS namespace: it must consist of {words}"
+                assert wrong["faults"] == {"fleet": why, "namespace": why}
+                assert (wrong["isSaved"], wrong["text"]) == (
+                    False,
+                    "Not saved: correct the marked fields",
+                )
+        assert file.load().settings == {}
+        for given in ({}, {"fleet": "yard"}, {"fleet": "yard", "namespace": "robot_1"}):
+            assert send(client, settings=given)["isSaved"]
+        assert file.load().settings == {"fleet": "yard", "namespace": "robot_1"}
+
+
 def test_what_was_given_at_the_start_is_not_changed(tmp_path: Path) -> None:
     stock(tmp_path)
     with served(tmp_path, given=lambda _: {"host": "10.9.9.9"}) as client:

@@ -9,14 +9,26 @@ from typing import Final
 from urc.expressions import Template
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile, Setting
+from urc.model.values import Value
+from urc.problems import UrcError, printable
+from urc.protocol.forms.topics import namespace_of
+from urc.ros_names import namespace_fault
 from urc.runtime.connection_cause import Cause
 
-__all__ = ["CONNECTION", "FURTHER", "failed_field", "groups_of", "place_field"]
+__all__ = [
+    "CONNECTION",
+    "FURTHER",
+    "failed_field",
+    "groups_of",
+    "namespace_faults",
+    "place_field",
+]
 
 CONNECTION: Final = ""
 """Group of settings for the connection to the robot."""
 FURTHER: Final = "*"
 """Group of all other settings without a declared group."""
+_SHOWN: Final = 80
 _PLACE: Final = ("host", "url", "address", "path")
 _LOGIN: Final = ("password", "key", "passphrase", "username", "user", "auth", "token", "headers")
 _OPTIONS: Final[Mapping[Cause, Sequence[str]]] = {
@@ -61,6 +73,28 @@ def groups_of(profile: Profile) -> dict[str, list[Setting]]:
     if further:
         groups[FURTHER] = further
     return {title: settings for title, settings in groups.items() if settings}
+
+
+def namespace_faults(profile: Profile, values: Mapping[str, Value]) -> dict[str, str]:
+    """Return why the settings make an invalid ROS namespace, keyed by the settings in it.
+
+    A connection test would refuse such a namespace, but settings can be stored without a test.
+
+    Args:
+        profile: profile of the robot.
+        values: values of the settings; missing ones are not checked.
+    """
+    faults: dict[str, str] = {}
+    for spec in profile.driver.transports.values():
+        try:
+            namespace = namespace_of(spec, values)
+        except UrcError:
+            continue  # a setting is missing, which the page says
+        fault = namespace_fault(namespace) if namespace else ""
+        if fault:
+            text = f"{printable(repr(namespace))[:_SHOWN]} is not a ROS namespace: {fault}"
+            faults |= dict.fromkeys(_used(spec.options.get("namespace")), text)
+    return faults
 
 
 def failed_field(profile: Profile, transport: str, cause: Cause) -> str:

@@ -29,7 +29,7 @@ from urc.runtime.settings_store import StoredSettings
 from urc.web.fleet.robots import RobotService, missing_settings
 from urc.web.manage.jobs import Busy
 from urc.web.manage.manager import Manager
-from urc.web.manage.setting_groups import failed_field, place_field
+from urc.web.manage.setting_groups import failed_field, namespace_faults, place_field
 from urc.web.manage.settings_page import settings_page
 from urc.web.manage.wire import ProbedTransport, SettingsAnswer, SettingsAsked
 from urc.web.serve.actors import actor_of
@@ -138,10 +138,11 @@ class SettingsRoutes:
         before = await asyncio.to_thread(self._kept, name)
         bare = await asyncio.to_thread(self._document, name, said.version)
         kept, faults = await asyncio.to_thread(self._filled_in, bare, before, said)
-        if faults:
+        robot = await asyncio.to_thread(factory.robot, name, bare, kept) if not faults else None
+        faults = faults if robot is None else namespace_faults(bare, robot.settings)
+        if faults or robot is None:
             text = t("Not saved: correct the marked fields")
             return SettingsAnswer(is_saved=False, text=text, faults=faults)
-        robot = await asyncio.to_thread(factory.robot, name, bare, kept)
         missing = tuple(one.title or spoken(one.name) for one in missing_settings(robot))
         lines: tuple[ProbedTransport, ...] = ()
         if said.test and not missing:
