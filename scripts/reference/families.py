@@ -225,7 +225,7 @@ FAMILIES: Mapping[str, Family] = {
         (
             *("interface", "interface:inlineInterface", "interface:grid", "interface:layouts"),
             *("interface:left_handed", "interface:mirror", "interface:tabs", "interface:tab"),
-            *("interface:background", "interface:overrides"),
+            *("interface:background", "interface:drawer", "interface:overrides"),
             *_driver("slots widgetUse commandBinding"),
         ),
         {"interfaces.md": "Interfaces"},

@@ -104,6 +104,17 @@ async def test_what_has_no_place_is_in_a_drawer_and_only_on_a_low_screen(
         await expect(page.locator(LIFT)).to_be_hidden()
 
 
+async def test_the_handle_has_the_title_that_the_interface_gives(new_page: PageMaker) -> None:
+    robot = crowded()
+    interface = robot.profile.interfaces["default"]._replace(drawer="Cargo")
+    robot.profile = robot.profile._replace(interfaces={"default": interface})
+    async with driven(robot=robot) as (_, address):
+        page = await lying(new_page, address)
+        await expect(page.locator(HANDLE)).to_have_text("Cargo")
+        await page.locator(HANDLE).click()
+        await expect(page.get_by_role("group", name="Cargo").locator(LIFT)).to_be_visible()
+
+
 async def test_a_control_in_the_drawer_is_released_when_it_closes_and_sticks_are_not(
     new_page: PageMaker,
 ) -> None:

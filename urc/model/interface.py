@@ -99,6 +99,8 @@ class Interface(NamedTuple):
     """Declared left-handed layouts, keyed by screen."""
     is_mirrored: bool = True
     tabs: Mapping[str, Tab] = NOTHING
+    drawer: str = ""
+    """Title of the drawer on a phone in landscape; "" means the titles of its first widgets."""
 
     @property
     def pages(self) -> tuple[Tab, ...]:

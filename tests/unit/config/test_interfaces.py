@@ -50,6 +50,11 @@ def test_an_interface_without_tabs_is_one_page(folder: Folder) -> None:
     assert page.left_handed == {"landscape": Layout(1, 2, (Slot("b", 0, 0), Slot("a", 0, 1)))}
 
 
+def test_an_interface_may_name_its_drawer(folder: Folder) -> None:
+    assert interface(folder, "{ grid: a, background: b, drawer: Flippers }").drawer == "Flippers"
+    assert interface(folder, "{ grid: a, background: b }").drawer == ""
+
+
 def test_what_an_interface_says_of_mirroring_holds_for_its_tabs(folder: Folder) -> None:
     """Unless a tab says something else."""
     tabs = "{ one: { grid: a }, two: { grid: b, mirror: true } }"

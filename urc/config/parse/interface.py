@@ -38,6 +38,7 @@ def parse_interface(part: Node, name: str, problems: Problems) -> Interface:
         left_handed=only.left_handed,
         is_mirrored=only.is_mirrored,
         tabs=tabs,
+        drawer=part.text("drawer"),
     )
     if background in interface.shown:
         problems.error(

@@ -78,9 +78,9 @@ class Drawer:
     cells: frozenset[int]
     """Indexes of their cells; empty if there is no drawer."""
     title: str
-    """Title of the only widget, or a common title."""
+    """Title from the interface, title of the only widget, or a common title."""
     names: str
-    """Titles of the first widgets, as many as the drawer's handle has room for."""
+    """Text of the handle: the title from the interface, or else the titles of the first widgets."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +217,7 @@ def robot_page(
         is_part=request.is_part,
         debug=debug_part(profile, request.dev_url) if interface is DEBUGGING else None,
         cells=_cells(profile, interface, uses, server.trust),
-        drawer=_drawer(slots, drawer_slots(interface, slots, footprints), titles),
+        drawer=_drawer(slots, drawer_slots(interface, slots, footprints), titles, interface.drawer),
         stop_url=f"{api}/stop",
         alarms_url=f"{api}/alarms",
         may_act=request.may_act and not is_watching,
@@ -256,10 +256,13 @@ def _uses(profile: Profile, interface: Interface) -> dict[str, WidgetUse]:
     return {name: use for name, use in found.items() if use is not None}
 
 
-def _drawer(slots: tuple[str, ...], drawer: frozenset[str], titles: Mapping[str, str]) -> Drawer:
+def _drawer(
+    slots: tuple[str, ...], drawer: frozenset[str], titles: Mapping[str, str], declared: str
+) -> Drawer:
+    """Return the drawer with these slots; `declared` is the interface's title for it, or ""."""
     inside = [titles[name] for name in slots if name in drawer]
-    title = inside[0] if len(inside) == 1 else words.t("More controls")
-    return Drawer(frozenset(map(slots.index, drawer)), title, first_names(inside))
+    title = declared or (inside[0] if len(inside) == 1 else words.t("More controls"))
+    return Drawer(frozenset(map(slots.index, drawer)), title, declared or first_names(inside))
 
 
 def first_names(names: Sequence[str]) -> str:
