@@ -58,8 +58,8 @@ async def test_one_card_has_cause_and_next_step_and_tries_at_once(new_page: Page
         await expect(page.locator(CARD)).to_be_hidden()
 
 
-def seeing_robot() -> FakeRobot:
-    """Return a robot whose camera is the background, with a battery in front."""
+def seeing_robot(*others: WidgetUse) -> FakeRobot:
+    """Return a robot whose camera is the background, with a battery and other widgets in front."""
     signals = {
         "eye": Signal("eye", "image", stale_after_s=1.0),
         "battery": Signal("battery", "integer", unit="%", stale_after_s=1.0),
@@ -67,9 +67,11 @@ def seeing_robot() -> FakeRobot:
     uses = (
         WidgetUse("eye", "camera", {"image": "eye"}),
         WidgetUse("battery", "battery", {"level": "battery"}),
+        *others,
     )
     profile = dashboard_profile(signals=signals, uses=uses, commands=commands(LEASE_S))
-    grid = Layout(2, 2, (Slot("eye", 1, 1), Slot("battery", 0, 0)))
+    slots = (Slot(one.slot, 1, column) for column, one in enumerate(others))
+    grid = Layout(2, 2, (Slot("eye", 1, 1), Slot("battery", 0, 0), *slots))
     interface = Interface("default", "Default", {"landscape": grid}, background="eye")
     return FakeRobot(profile._replace(interfaces={"default": interface}))
 
@@ -122,6 +124,30 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
         robot.set_reading("battery", 73)
         await expect(page.locator(CARD)).to_be_hidden()
         await expect(page.locator(GROUND_CELL)).not_to_have_attribute("data-old", re.compile(""))
+
+
+@pytest.mark.parametrize("size", ["phone", "tablet"])
+async def test_controls_are_out_of_sight_until_the_robot_is_back(
+    new_page: PageMaker, size: Size
+) -> None:
+    """The card is in their place; STOP and a control with the focus stay in sight."""
+    lift = WidgetUse("lift", "hold-button", {}, {"held": "lift"})
+    robot = seeing_robot(lift)
+    async with running_dashboard(robot) as address:
+        page = await new_page(size=size)
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        control = page.locator(".urc-cell:has(.hold-button)")
+        await expect(control).to_have_css("opacity", "1")
+        robot.link("lost", REFUSED)
+        await expect(page.locator(CARD)).to_be_visible()
+        await expect(control).to_have_css("opacity", "0")
+        await expect(page.locator("[data-stop-button]")).to_be_visible()
+        await control.locator(".hold-button-main").focus()
+        await expect(control).to_have_css("opacity", "1")
+        await page.locator("[data-lost-again]").focus()
+        robot.link("live")
+        await expect(control).to_have_css("opacity", "1")
 
 
 COVERED = """() => {

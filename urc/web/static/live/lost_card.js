@@ -91,9 +91,8 @@ export class LostCard {
   place() {
     const room = this.el.getBoundingClientRect();
     const card = part(this.el, ".urc-lost-card").getBoundingClientRect();
-    const top = this.age.textContent ? this.age.getBoundingClientRect().top : card.top;
     const { paddingTop, paddingBottom } = getComputedStyle(this.el);
-    const height = card.bottom - top;
+    const { height } = card;
     const old = this.root.querySelectorAll('.urc-cell[data-old]:not([data-place="ground"], [data-footprint="view"])');
     const values = [...old].filter((el) => el.checkVisibility()).map((el) => el.getBoundingClientRect());
     const covers = (/** @type {number} */ y) =>
