@@ -233,7 +233,9 @@ def _choices(
 def _about(setting: Setting) -> str:
     parts = [setting.description.rstrip(".")] if setting.description else []
     low, high = setting.min, setting.max
-    if setting.type == "port":
+    if parts and setting.type in ("port", "host"):
+        pass  # the author's words say more
+    elif setting.type == "port":
         parts.append(t("A port, 1 to 65535"))
     elif setting.type == "host":
         parts.append(t("A name or an address, such as 192.168.1.20"))
