@@ -17,6 +17,8 @@ import { Socket } from "../live/socket.js";
 import { DASH, Store, ageText } from "../live/store.js";
 
 const DRAW_EVERY_MS = 200;
+/** Most characters of a value, such as a map, in the table of signals. */
+const LONGEST = 200;
 const ANSWER_WITHIN_MS = 10_000;
 /** @type {Record<string, string>} */
 const STATES = { running: "●", waiting: "◆", broken: "▲" };
@@ -163,7 +165,7 @@ function take(message) {
 /** @param {{edition: number, state: string, file: string, told: string, problems: Found[], lines: any[], commands: any[]}} told */
 function profile(told) {
   state.dataset["state"] = told.state;
-  const words = told.told || "is running; save it, and it is loaded anew";
+  const words = told.told || "is running; URC reloads it when you save it";
   state.textContent = `${STATES[told.state] ?? ""} ${visible(told.file)} ${visible(words)}`;
   findings.replaceChildren(
     ...told.problems.map(({ severity, text }) => {
@@ -211,7 +213,8 @@ function shown(reading) {
   const value = reading.value;
   if (value === null || typeof value !== "object") return visible(reading.text);
   if ("bytes" in value) return `<${String(value.bytes)} bytes>`;
-  return visible(JSON.stringify(value));
+  const text = JSON.stringify(value);
+  return visible(text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text);
 }
 
 /**
