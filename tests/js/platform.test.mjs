@@ -190,17 +190,18 @@ test("people see their own units, the value stays as it is declared", () => {
 
 test("a binary frame is an image with its signal, age and type", () => {
   const type = "image/png";
-  const data = new ArrayBuffer(16 + type.length + 2);
+  const data = new ArrayBuffer(20 + type.length + 2);
   const view = new DataView(data);
   view.setUint8(0, 1);
   view.setUint8(1, type.length);
   view.setUint16(2, 513);
   view.setUint32(4, 40);
   view.setFloat64(8, 1000);
-  new Uint8Array(data).set([...type].map((letter) => letter.charCodeAt(0)), 16);
-  new Uint8Array(data).set([7, 8], 16 + type.length);
+  view.setUint32(16, 70000);
+  new Uint8Array(data).set([...type].map((letter) => letter.charCodeAt(0)), 20);
+  new Uint8Array(data).set([7, 8], 20 + type.length);
   const frame = frameOf(data);
-  assert.deepEqual([frame?.index, frame?.ageMs, frame?.sentMs, frame?.type], [513, 40, 1000, type]);
+  assert.deepEqual([frame?.index, frame?.ageMs, frame?.sentMs, frame?.number, frame?.type], [513, 40, 1000, 70000, type]);
   assert.deepEqual([...(frame?.bytes ?? [])], [7, 8]);
   for (const size of [0, 15, 20]) assert.equal(frameOf(data.slice(0, size)), null);
   view.setUint8(0, 2);
@@ -209,7 +210,7 @@ test("a binary frame is an image with its signal, age and type", () => {
 
 test("an image has an age like every value, and goes with it", () => {
   const store = storeOf({ type: "image", stale_after_s: 1 });
-  store.picture({ index: 0, ageMs: 500, sentMs: 0, type: "image/png", bytes: new Uint8Array(9) }, 0);
+  store.picture({ index: 0, ageMs: 500, sentMs: 0, number: 3, type: "image/png", bytes: new Uint8Array(9) }, 0);
   const fresh = store.reading("s0", 0);
   assert.deepEqual([fresh.state, fresh.value, fresh.image?.blob.size], ["live", { bytes: 9 }, 9]);
   assert.equal(store.reading("s0", 600).state, "stale");
@@ -222,7 +223,7 @@ test("the last values of a lost link stay, with their ages, for as long as it is
   const link = (/** @type {string} */ state, /** @type {number} */ nowMs) =>
     store.setLinks(/** @type {any} */ ([{ transport: "wire", state, since: 0 }]), nowMs);
   link("live", 0);
-  store.picture({ index: 0, ageMs: 0, sentMs: 0, type: "image/png", bytes: new Uint8Array(9) }, 0);
+  store.picture({ index: 0, ageMs: 0, sentMs: 0, number: 4, type: "image/png", bytes: new Uint8Array(9) }, 0);
   assert.equal(store.lastAgeMs("s0", 500), -1, "a live value is not the last one");
   link("lost", 500);
   assert.equal(store.reading("s0", 501).state, "stale", "at once");

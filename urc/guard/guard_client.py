@@ -19,6 +19,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Final, NamedTuple
 
 from msgspec.structs import replace
@@ -61,6 +62,8 @@ class _Control:
     """Number of the first tick since the control was armed."""
     at_s: float = 0.0
     """Time of the newest tick on the guard's clock, in seconds."""
+    until_s: float = inf
+    """Time at which the newest tick's image is too old, on the guard's clock, in seconds."""
     counted: CountedFrame | None = None
     """Frame of the newest tick; None if the frame contains no counters."""
     may_move: bool = False
@@ -139,13 +142,17 @@ class GuardClient:
         control.is_armed, control.first = True, control.number + 1
         self.channel.post(messages.ArmControl(control.line, command, terms))
 
-    def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease of `command`, with `data` as the command's newest frame. Never waits."""
+    def tick(self, command: str, data: Payload | CountedFrame, for_s: float = inf) -> None:
+        """Renew the lease of `command`, with `data` as the command's newest frame. Never waits.
+
+        The lease ends after `for_s` seconds at the latest.
+        """
         control = self._controls.get(command)
         if control is None or not control.is_armed:
             return  # the guard has stopped it, and would drop the tick
         control.number += 1
         control.at_s = self.channel.now()
+        control.until_s = control.at_s + for_s
         control.may_move = True
         control.counted = data if isinstance(data, CountedFrame) else None
         numbered = data.numbered if isinstance(data, CountedFrame) else Numbered(data, _UNCOUNTED)
@@ -153,7 +160,9 @@ class GuardClient:
 
     def _post_tick(self, command: str, control: _Control, numbered: Numbered) -> None:
         count = numbered.takes if numbered.takes.after else None
-        tick = messages.RenewLease(command, control.number, numbered.data, control.at_s, count)
+        tick = messages.RenewLease(
+            command, control.number, numbered.data, control.at_s, count, control.until_s
+        )
         self.channel.post(tick, slot=command)
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:

@@ -6,6 +6,7 @@ connection. The receiver drops messages with an earlier `turn`.
 """
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
 import msgspec
@@ -131,6 +132,9 @@ class RenewLease(msgspec.Struct, array_like=True, frozen=True, tag=7):
     original time."""
     count: Count | None = None
     """Counter values of the frame, as in `SendBytes`."""
+    until_s: float = inf
+    """Time at which the operator's image becomes too old, on the same clock as `at_s`. The lease
+    ends at this time at the latest."""
 
 
 class ReleaseControl(msgspec.Struct, array_like=True, frozen=True, tag=8):

@@ -13,6 +13,7 @@ is lost while a control is in doubt, a stop becomes pending.
 import asyncio
 from collections.abc import Callable
 from functools import partial
+from math import inf
 from typing import Final
 
 from urc.guard.send_queue import LaneClock, SendQueue, TimerHandle, tolerant
@@ -126,9 +127,19 @@ class MotionScheduler:
         self._hold_to_run(control, terms).arm()
 
     def tick(
-        self, control: str, number: int, data: Payload, at_s: float, count: Count | None = None
+        self,
+        control: str,
+        number: int,
+        data: Payload,
+        at_s: float,
+        count: Count | None = None,
+        until_s: float = inf,
     ) -> None:
-        """Handle input that was sampled at `at_s`; empty `data` only renews the lease."""
+        """Handle input that was sampled at `at_s`; empty `data` only renews the lease.
+
+        The lease ends at `until_s` at the latest. The tick of an image that is already too old ends
+        the motion.
+        """
         hold_to_run = self._holds.get(control)
         if hold_to_run is None:
             return
@@ -137,8 +148,13 @@ class MotionScheduler:
         now = self._clock.now()
         if now - at_s >= hold_to_run.terms.lease_s:
             return  # too old to renew the lease
+        if now >= until_s:
+            if hold_to_run.state == "moving":
+                hold_to_run.stop("expired", now)
+            return
         is_stale = not self._sent_counters.fits(count)
-        if hold_to_run.tick(None if is_stale else data or None, min(at_s, now)) and is_stale:
+        newest = None if is_stale else data or None
+        if hold_to_run.tick(newest, min(at_s, now), until_s) and is_stale:
             self._stale.append((control, number))
 
     def renew(self, control: str, stop: Payload, stops: tuple[Numbered, ...] = ()) -> None:

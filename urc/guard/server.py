@@ -56,7 +56,9 @@ class GuardServer:
         if type(said) is messages.RenewLease and not self._is_finishing:
             line = self._controls.get(said.control)
             if line is not None:
-                line.scheduler.tick(said.control, said.number, said.data, said.at_s, said.count)
+                line.scheduler.tick(
+                    said.control, said.number, said.data, said.at_s, said.count, said.until_s
+                )
                 self._stirred.add(line)
         elif not self._is_finishing:
             self._handlers[type(said)](said)

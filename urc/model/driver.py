@@ -37,6 +37,7 @@ __all__ = [
     "Reply",
     "Timeouts",
     "TransportSpec",
+    "slowed_arguments",
 ]
 
 
@@ -238,6 +239,32 @@ class Command(NamedTuple):
             return bool(self.moves_if.evaluate({**defaults, **arguments}))
         except ExpressionError:
             return True
+
+
+def slowed_arguments(command: Command) -> dict[str, Reading]:
+    """Return the arguments of a held command that set its speed, with their values at rest.
+
+    These are the numeric arguments without choices that ``release`` names, or whose default is 0.
+    A value closer to rest may be a higher speed for any other argument, such as a gain.
+    """
+    release = command.hold.release if command.hold is not None else NOTHING
+    found: dict[str, Reading] = {}
+    for name, one in command.arguments.items():
+        kind = one.items if one.type == "array" else one.type
+        rest = release.get(name, one.default)
+        if (
+            kind in ("integer", "number")
+            and not one.choices
+            and (name in release or _is_zero(rest))
+        ):
+            found[name] = rest
+    return found
+
+
+def _is_zero(value: Reading) -> bool:
+    """Return whether a value is the number 0, or a list of zeros."""
+    items = value if isinstance(value, (tuple, list)) else (value,)
+    return bool(items) and all(type(one) in (int, float) and one == 0 for one in items)
 
 
 class Poll(NamedTuple):

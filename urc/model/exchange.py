@@ -25,6 +25,7 @@ __all__ = [
     "Queue",
     "Requirement",
     "Retry",
+    "Sight",
     "Stage",
     "Verify",
 ]
@@ -99,6 +100,18 @@ MOST_STOPS: Final = 11
 """Maximum number of times that one stop is sent on a transport that may lose frames."""
 
 
+class Sight(NamedTuple):
+    """The image that the operator must see to drive, and the limits of its age."""
+
+    signal: str
+    """Signal of type ``image`` or ``video``."""
+    stop_after_s: float
+    """Age of the image at which the motion ends, 0.2 to 5 s."""
+    slow_after_s: float | None = None
+    """Age of the image at which the permitted speed begins to fall, in seconds. None means that the
+    speed stays the same up to `stop_after_s`."""
+
+
 class Hold(NamedTuple):
     """A command that moves the robot only while the operator holds the control."""
 
@@ -119,6 +132,8 @@ class Hold(NamedTuple):
     step_s: float | None = None
     """Maximum duration of one motion step, in seconds, if the robot ends each step without a stop.
     None means that the robot moves until a stop arrives."""
+    sight: Sight | None = None
+    """The image that the operator must see; None if the motion needs no image."""
 
 
 class Confirm(NamedTuple):

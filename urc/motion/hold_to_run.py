@@ -15,6 +15,7 @@ frame sent on the restored connection. Values that were unsent when the connecti
 dropped.
 """
 
+from math import inf
 from typing import Final, Literal, NamedTuple
 
 from urc.model.payload import FrameVariants, Numbered, Payload
@@ -138,11 +139,15 @@ class HoldToRun:
         """Accept ticks from now on; the first tick begins the motion."""
         self.is_armed = True
 
-    def tick(self, data: Payload | None, now: float) -> bool:
+    def tick(self, data: Payload | None, now: float, until: float = inf) -> bool:
         """Accept a tick of sampled input: renew the lease, and store `data` as the newest value.
 
-        Without `data` (None), the tick renews the lease but drops any unsent value, because the new
-        input value cannot be sent.
+        Args:
+            data: the newest value. None renews the lease but drops any unsent value, because the
+                new input value cannot be sent.
+            now: the time of the sample.
+            until: time at which the lease ends at the latest, because the operator's image is then
+                too old.
 
         Returns:
             Whether the tick was accepted. After a refusal, the control must be armed again.
@@ -153,7 +158,7 @@ class HoldToRun:
             return False
         self.state = "moving"  # also during the repeated stops after a release
         self._waiting = data
-        self._expires_at = now + self.terms.lease_s
+        self._expires_at = min(now + self.terms.lease_s, until)
         return True
 
     def forget(self) -> None:

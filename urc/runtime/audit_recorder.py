@@ -194,6 +194,12 @@ class AuditRecorder:
             )
 
     @_harmless
+    def overrode(self, client: Operator, epoch: int, for_s: float) -> None:
+        """Record that an operator may drive without an image for `for_s` seconds."""
+        outcome = f"may drive without an image for {for_s:g} s"
+        self._record("override", client, epoch=epoch, outcome=outcome)
+
+    @_harmless
     def ran(
         self,
         client: Operator,

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Literal, Protocol
 
-from urc.model.driver import Command, Driver
+from urc.model.driver import Command, Driver, slowed_arguments
 from urc.model.exchange import Hold
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.values import Reading
@@ -52,8 +53,8 @@ class MotionBackend(Protocol):
     def arm(self, command: str, terms: HoldTerms) -> None:
         """Accept ticks of `command` from now on, with the stop frame and time limits in `terms`."""
 
-    def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease of `command`, with `data` as its newest frame."""
+    def tick(self, command: str, data: Payload | CountedFrame, for_s: float = inf) -> None:
+        """Renew the lease of `command` with its newest frame, for at most `for_s` seconds."""
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:
         """Replace the stop frame of `command` without arming the command."""
@@ -113,6 +114,10 @@ class HeldControl:
     """Default value of each argument whose slew rate is limited, keyed by argument."""
     needs_ready_line: bool
     """Whether a stop that is sent before the transport is ready must be repeated."""
+    rests: Mapping[str, Reading]
+    """Value at rest of each argument that the driving lock slows, keyed by argument."""
+    is_sight_short: bool = False
+    """Whether the last tick's image limits the lease."""
     is_armed: bool = False
     is_lasting: bool = False
     """Whether the stop frame stays the same while the command is armed."""
@@ -169,7 +174,8 @@ def control_of(driver: Driver, command: Command) -> HeldControl:
     # line, the stop may collide with the robot's unfinished answer.
     needs_ready_line = bool(line.on_connect) or line.is_half_duplex
     period_s = period_of(driver, command)
-    return HeldControl(command.transport, hold, period_s, slew, defaults, needs_ready_line)
+    rests = slowed_arguments(command) if hold.sight is not None else {}
+    return HeldControl(command.transport, hold, period_s, slew, defaults, needs_ready_line, rests)
 
 
 def period_of(driver: Driver, command: Command) -> float:

@@ -12,6 +12,7 @@ from urc.config.node import shown_duration
 from urc.config.values import shown
 from urc.expressions import Template
 from urc.model.driver import Argument, Command, Driver, TransportSpec
+from urc.model.exchange import Sight
 from urc.model.interface import WidgetUse
 from urc.model.payload import each_of, traffic_of
 from urc.model.profile import Profile, Setting
@@ -174,6 +175,8 @@ def _commands(driver: Driver) -> Iterator[str]:
         if command.hold is not None:
             every = shown_duration(command.hold.repeat_s)
             yield f"- held: sent every {every} while the control is held"
+            if (sight := command.hold.sight) is not None:
+                yield f"- needs a current image of {_code(sight.signal)}: {_image_limits(sight)}"
         if command.moves:
             where = f" where {_code(command.moves_if.source)}" if command.moves_if else ""
             until = "refused while STOP is latched or another operator is driving"
@@ -246,6 +249,14 @@ def _allowed(argument: Argument) -> str:
     if argument.choices:
         return ", ".join(_code(_value(choice)) for choice in argument.choices)
     return _range(argument.min, argument.max, "")
+
+
+def _image_limits(sight: Sight) -> str:
+    """Describe the ages of an image at which a motion slows down and ends."""
+    stops = f"stops at an age of {shown_duration(sight.stop_after_s)}"
+    if sight.slow_after_s is None:
+        return stops
+    return f"slower from an age of {shown_duration(sight.slow_after_s)}, {stops}"
 
 
 def _need(argument: Argument) -> str:

@@ -3,8 +3,9 @@
 Theory of operation. Pages send release messages, and ticks of sampled input. For each tick, the
 controller checks the page's lease and the age of the tick, and the engine checks the arguments. The
 controller then passes the frame to the motion backend, which owns the connection and enforces the
-time limits. The first tick of a gesture arms the control. The first tick also renders the stop
-frame, so that a stop needs neither the engine nor the document.
+time limits. The age of an image may limit both; see `urc.motion.driving_lock`. The first tick of a
+gesture arms the control. The first tick also renders the stop frame, so that a stop needs neither
+the engine nor the document.
 
 If a control stops without a release, it stays disarmed until its page sends a release. A stick that
 is still held after a reconnection does not move the robot.
@@ -25,6 +26,7 @@ from urc.model.driver import Command, Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.role import includes
 from urc.model.values import Reading
+from urc.motion.driving_lock import BLIND_S, slowed
 from urc.motion.freshness import ControlInput, Freshness
 from urc.motion.hold_to_run import HoldTerms, StopReport
 from urc.motion.lease import REQUEST_S, Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
@@ -39,13 +41,14 @@ from urc.runtime.held_commands import (
     is_lossy,
     restored_s,
 )
+from urc.runtime.image_interlock import OLD_IMAGE, ImageInterlock, why_blind
+from urc.runtime.motion_callbacks import Moved, unchanged, unrefused, unseen
 
 __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
 
 Verb = str
-"""A lease request: ``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave`` or ``reset``."""
-Moved = Callable[[Operator, int, str, Mapping[str, Reading], Payload, float], None]
-"""Arguments of the callback: operator, lease epoch, command, arguments, frame, time."""
+"""A lease request: ``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave``, ``reset``, or
+``override``, which permits to drive without an image for a moment."""
 MOST_SCREENS = 256
 _FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
@@ -96,14 +99,15 @@ class MotionController:
         self._due: set[str] = set()
         """Held commands whose stop must still be passed to a backend, or passed again because it
         was too early."""
+        self.images = ImageInterlock(self._holds)
         self._ended: MotionBackend | None = None
         """Backend of the previous session; it may still deliver stops while that session ends."""
-        self.on_change: Callable[[LeaseState], None] = _ignore
+        self.on_change: Callable[[LeaseState], None] = unchanged
         """Callback after each change to the lease and after each confirmed stop."""
-        self.on_moved: Moved = _unseen
+        self.on_moved: Moved = unseen
         """Callback for each tick that is passed to the backend; it must neither block nor raise an
         exception."""
-        self.on_refused: Callable[[str, str], None] = _unrefused
+        self.on_refused: Callable[[str, str], None] = unrefused
         """Callback that receives the control and the message when the robot refuses to move."""
 
     @property
@@ -148,6 +152,11 @@ class MotionController:
     def holds(self, command: str) -> bool:
         """Return whether `command` is a held command."""
         return command in self._holds
+
+    def was_blind(self, command: str) -> bool:
+        """Return whether the image that the operator saw was too old, so that the motion ended."""
+        control = self._controls.get(command)
+        return control is not None and control.needs_release and control.why == OLD_IMAGE
 
     def rests(self, command: str) -> bool:
         """Return whether a held command is at rest and its last stop was reported as written."""
@@ -280,6 +289,10 @@ class MotionController:
             outcome = lease.leave(client)
         elif verb == "reset":
             outcome = lease.reset(who, stops)
+        elif verb == "override":
+            refusal = lease.refusal(client, lease.state.epoch)
+            refusal = refusal or self.images.override(client, for_s, now)
+            outcome = LeaseRefused(refusal) if refusal else LeaseChanged(lease.state, False)
         else:
             return f"unknown lease request {verb!r}"
         if isinstance(outcome, LeaseRefused):
@@ -328,8 +341,12 @@ class MotionController:
         arguments: Mapping[str, Reading],
         given: ControlInput,
         now: float,
+        age_s: float = BLIND_S,
     ) -> str:
-        """Handle a tick of sampled input; return the reason for a refusal, or ""."""
+        """Handle a tick of sampled input; return the reason for a refusal, or "".
+
+        `age_s` is the age of the image on the page. Only commands that require an image use it.
+        """
         control, screen = self._controls.get(command), self._screens.get(client)
         if control is None or screen is None:
             return f"{command!r} is not a held command of this robot"
@@ -344,6 +361,12 @@ class MotionController:
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return _NO_ROBOT
+        permit = self.images.permit(command, client, age_s, now)
+        if permit is not None:
+            if permit.for_s <= 0:
+                return self._end_blind(command, control, backend, age_s)
+            control.is_sight_short = permit.for_s < control.hold.lease_s
+            arguments = slowed(arguments, control.rests, permit.share)
         if control.slew is not None:
             arguments = control.limited(arguments, now)
         try:
@@ -358,12 +381,26 @@ class MotionController:
             return str(error)
         self.lease.touch(now)
         control.motion_state = "moving"
-        backend.tick(command, data)
+        if permit is None:
+            backend.tick(command, data)
+        else:
+            backend.tick(command, data, permit.for_s)
         if data == b"":
             return ""  # it is waiting for the robot's reply
         shown = data.numbered.data if isinstance(data, CountedFrame) else data
         self.on_moved(screen.client, epoch, command, arguments, shown, now)
         return ""
+
+    def _end_blind(
+        self, command: str, control: HeldControl, backend: MotionBackend, age_s: float
+    ) -> str:
+        """End a motion, or refuse to begin it, because the page shows no current image."""
+        is_moving = control.motion_state == "moving"
+        why = why_blind(age_s, is_moving=is_moving)
+        self._abandon(command, control, backend, why)
+        if is_moving:
+            self.on_refused(command, why)
+        return why
 
     def _is_disarmed_at_rest(
         self, command: str, control: HeldControl, backend: MotionBackend
@@ -434,7 +471,8 @@ class MotionController:
         if control.motion_state == "ending":  # otherwise, it is already moving again
             control.motion_state = "rest"
         if reason not in ("released", "stopped"):
-            self._close(control, _CUT if reason == "revoked" else LET_GO)
+            late = OLD_IMAGE if reason == "expired" and control.is_sight_short else LET_GO
+            self._close(control, _CUT if reason == "revoked" else late)
         if self._is_too_early(command, control):
             control.is_owed_again = True
             return
@@ -516,6 +554,7 @@ class MotionController:
     def _settle(self, outcome: LeaseChanged | None, *, is_stopped: bool = False) -> None:
         if outcome is None:
             return
+        self.images.lease_changed(outcome.state)
         if outcome.must_stop:
             if not is_stopped:
                 self._stop_what_moves()
@@ -551,25 +590,6 @@ class MotionController:
         return made
 
 
-def _unrefused(command: str, why: str) -> None:
-    """Ignore a refusal."""
-
-
 def _is_cancellation(command: Command) -> bool:
     """Return whether a command cancels the goals of a ROS action."""
     return command.send.options.get("verb") == "cancel"
-
-
-def _ignore(state: LeaseState) -> None:
-    """Ignore a change."""
-
-
-def _unseen(
-    client: Operator,
-    epoch: int,
-    command: str,
-    arguments: Mapping[str, Reading],
-    data: Payload,
-    now: float,
-) -> None:
-    """Ignore a tick."""

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
+from math import inf
 
 from urc.model.driver import Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
@@ -128,11 +129,12 @@ class FakeMotionBackend:
         """Return whether ticks of the command are accepted."""
         return command in self._backend and self._backend[command].is_armed
 
-    def tick(self, command: str, data: Payload | CountedFrame) -> None:
-        """Renew the lease."""
+    def tick(self, command: str, data: Payload | CountedFrame, for_s: float = inf) -> None:
+        """Renew the lease, for at most `for_s` seconds."""
         assert not isinstance(data, CountedFrame)  # noqa: S101 - the fake has no shared counters
-        if self._backend[command].tick(data or None, self._clock.now()):
-            self.ticked_s = self._clock.now()
+        now = self._clock.now()
+        if self._backend[command].tick(data or None, now, now + for_s):
+            self.ticked_s = now
         self.write_due()
 
     def renew(self, command: str, stop: Payload | FrameVariants) -> None:

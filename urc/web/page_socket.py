@@ -14,6 +14,7 @@ from time import time
 from starlette.types import Message
 from starlette.websockets import WebSocketDisconnect
 
+from urc.motion.driving_lock import SentImages
 from urc.runtime.one_shot_commands import OUT_OF_SCOPE
 from urc.web.drive.command_runner import CommandOutcome
 from urc.web.drive.control_service import OperatorSession
@@ -156,6 +157,7 @@ class BrowserClient:
 
     async def _converse(self, live: LiveSession, operator: OperatorSession) -> None:
         self._place = live.fanout.join(self._flushed)
+        self._place.images = operator.images = SentImages(self._service.controls.images.signals)
         self._alarm_place = self._service.alarm_feed.join(self._news.set)
         try:
             self._service.consent.welcome(operator)

@@ -46,8 +46,9 @@ SCREEN_NAME_LENGTH: Final = 40
 _Scalar = bool | int | float | str
 Arguments = dict[str, bool | int | float | str | tuple[_Scalar, ...] | None]
 """Arguments of a command, as sent by the client."""
-Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset"]
-"""Kind of a request about the lease; ``reset`` resets a latched STOP."""
+Verb = Literal["take", "ask", "yes", "no", "force", "leave", "reset", "override"]
+"""Kind of a request about the lease. ``reset`` resets a latched STOP. ``override`` permits the
+holder to drive without an image for a moment."""
 
 
 class Ping(msgspec.Struct, tag_field="t", tag="ping", forbid_unknown_fields=True, frozen=True):
@@ -148,13 +149,20 @@ class Drive(
 
     verb: Verb
     for_s: float = REQUEST_S
-    """Time that the holder has to answer, in seconds."""
+    """Time that the holder has to answer, or the duration of an override, in seconds."""
     stops: int | None = None
     """Number of STOPs known to the page. A reset is refused if STOP has been pressed again since
     then; null means the current number."""
 
 
-class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True, frozen=True):
+class Tick(
+    msgspec.Struct,
+    tag_field="t",
+    tag="tick",
+    forbid_unknown_fields=True,
+    omit_defaults=True,
+    frozen=True,
+):
     """One sample of a held control. See `urc.motion.freshness.ControlInput`."""
 
     command: str
@@ -162,6 +170,10 @@ class Tick(msgspec.Struct, tag_field="t", tag="tick", forbid_unknown_fields=True
     number: int
     echo: int
     arguments: Arguments = {}
+    sees: tuple[int, int] | None = None
+    """The shown image of the signal that the command requires. The first item is the number in the
+    image's message. The second is for how long the page has shown the image, in milliseconds.
+    Without `sees`, the page counts as blind; see `urc.motion.driving_lock`."""
 
 
 class Release(

@@ -4,15 +4,17 @@ Layer 3½. Pure. An image, or other bytes::
 
     0  u8   1: an image             4  u32  its age in milliseconds at the moment of encoding
     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
-    2  u16  index of the signal    16       media type in ASCII, then the bytes
+    2  u16  index of the signal    16  u32  number of the image
+                                   20       media type in ASCII, then the bytes
 
 An access unit of a video has 2 as its first byte, and the codec string in place of the media type.
-Nine bytes follow the common header::
+Five bytes follow the common header::
 
-   16  u32  number of the unit     22  u16  height in pixels
    20  u16  width in pixels        24  u8   1 for a keyframe
+   22  u16  height in pixels
 
-The numbers of one signal are consecutive. After a gap, the next unit is a keyframe.
+A page names the image that it shows by its number. The numbers of one video are consecutive. After
+a gap, the next unit is a keyframe.
 """
 
 import struct
@@ -26,7 +28,7 @@ PICTURE: Final = 1
 """First byte of a message with an image, which marks its kind."""
 VIDEO: Final = 2
 """First byte of a message with an access unit."""
-PICTURE_HEADER: Final = struct.Struct(">BBHId")
+PICTURE_HEADER: Final = struct.Struct(">BBHIdI")
 VIDEO_HEADER: Final = struct.Struct(">BBHIdIHHB")
 
 
@@ -46,7 +48,7 @@ def read_picture(message: bytes) -> PictureMessage | None:
         return _read_video(message)
     if len(message) < PICTURE_HEADER.size:
         return None
-    kind, type_length, index, age_ms, _ = PICTURE_HEADER.unpack_from(message)
+    kind, type_length, index, age_ms, *_ = PICTURE_HEADER.unpack_from(message)
     if kind != PICTURE:
         return None
     return PictureMessage(index, age_ms, message[PICTURE_HEADER.size + type_length :])

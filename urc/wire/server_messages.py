@@ -239,6 +239,8 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """Secret key for the page's redundant socket; "" for watchers."""
     role: Role | None = None
     """The page's role for the robot; None if the page has no rights."""
+    override: int = 0
+    """Time for which the holder may still drive without an image, in milliseconds."""
 
 
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):

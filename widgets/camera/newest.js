@@ -14,7 +14,8 @@
 
 export class Newest {
   /**
-   * @param {(bitmap: ImageBitmap) => void} show shows an image, and may keep its bitmap
+   * @param {(bitmap: ImageBitmap, picture: Picture | VideoImage) => void} show shows an image, and may keep
+   *   its bitmap
    * @param {(blob: Blob) => void} failed receives an image that cannot be decoded
    */
   constructor(show, failed) {
@@ -43,13 +44,13 @@ export class Newest {
     this.isBusy = true;
     while (this.next && !this.isOver) {
       const picture = this.next;
-      const blob = "blob" in picture ? picture.blob : null;
+      const blob = blobOf(picture);
       const { source } = this;
       this.next = null;
       try {
         const bitmap = await createImageBitmap("blob" in picture ? picture.blob : picture.bitmap);
         if (this.isOver || source !== this.source) bitmap.close();
-        else this.replace(bitmap, blob);
+        else this.replace(bitmap, picture);
       } catch {
         // A newer image of a video closes the earlier bitmap.
         if (blob && !this.isOver && source === this.source) this.failed(blob);
@@ -60,11 +61,11 @@ export class Newest {
 
   /**
    * @param {ImageBitmap} bitmap
-   * @param {Blob | null} blob
+   * @param {Picture | VideoImage} picture
    */
-  replace(bitmap, blob) {
-    this.shown = { blob, width: bitmap.width, height: bitmap.height };
-    this.show(bitmap);
+  replace(bitmap, picture) {
+    this.shown = { blob: blobOf(picture), width: bitmap.width, height: bitmap.height };
+    this.show(bitmap, picture);
     bitmap.close();
   }
 
@@ -80,4 +81,9 @@ export class Newest {
     this.isOver = true;
     this.leave();
   }
+}
+
+/** @param {Picture | VideoImage} picture */
+function blobOf(picture) {
+  return "blob" in picture ? picture.blob : null;
 }

@@ -68,10 +68,11 @@ class Camera {
     /** Note for the operator who turns the camera. */
     this.hand = "";
     this.pictures = new Newest(
-      (bitmap) => {
+      (bitmap, picture) => {
         this.fault = "";
         this.rate?.add(performance.now() / 1000);
         if (this.screen.show(bitmap)) this.draw();
+        ctx.shown(picture);
         if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },

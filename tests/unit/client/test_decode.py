@@ -78,6 +78,6 @@ def test_other_messages_are_passed_over(text: str) -> None:
 def test_images_arrive_whole() -> None:
     """Their type is the first thing in them anyway."""
     data = b"\xff\xd8\xff\xe0 picture"
-    assert read_picture(encode_picture(3, data, 40, 1000)) == PictureMessage(3, 40, data)
+    assert read_picture(encode_picture(3, data, 9, 40, 1000)) == PictureMessage(3, 40, data)
     assert read_picture(b"") is None
     assert read_picture(b"\x02" + bytes(40)) is None

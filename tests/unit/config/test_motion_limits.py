@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.unit.config.folder import WIRE, Folder, head
+from urc.model.exchange import Sight
 from urc.protocol.engine import Engine
 from urc.protocol.requests.encode import BadArgument
 
@@ -44,3 +45,32 @@ def test_a_robot_holds_to_a_smaller_range_and_a_slower_growth(tmp_path: Path) ->
     for value in (0.21, -1, 1):
         with pytest.raises(BadArgument, match="v:"):
             engine.motions.motion_frame("drive", {"v": value}, 0.0)
+
+
+SEEING = """\
+signals: { front: { type: image } }
+messages: { front: { regex: '^IMAGE (?P<front>.+)$' } }
+"""
+
+
+def test_a_robot_names_the_image_that_its_operator_must_see(tmp_path: Path) -> None:
+    """A driver for many robots does not know their cameras."""
+    folder = Folder(tmp_path)
+    more = "hold: { sees: front, slow_after: 300ms, stop_after: 700ms }"
+    robot = ROBOT.replace("hold: { slew: { v: 0.5 } }", more)
+    folder.write(cart=DRIVER + SEEING, small_cart=robot)
+    profile = folder.check("small_cart").profile
+    assert profile is not None, [one.message for one in folder.found("small_cart")]
+    hold = profile.driver.commands["drive"].hold
+    assert hold is not None
+    assert hold.sight == Sight("front", 0.7, 0.3)
+
+
+def test_a_document_without_sees_has_no_image_to_drive_by(tmp_path: Path) -> None:
+    folder = Folder(tmp_path)
+    folder.write(cart=DRIVER, small_cart=ROBOT)
+    profile = folder.check("small_cart").profile
+    assert profile is not None
+    hold = profile.driver.commands["drive"].hold
+    assert hold is not None
+    assert hold.sight is None

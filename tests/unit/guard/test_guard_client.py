@@ -186,3 +186,13 @@ def test_stop_of_what_was_never_armed_has_the_terms_of_its_line(guard: GuardClie
             ]
         )
     ]
+
+
+def test_tick_says_when_the_image_of_its_operator_is_too_old(guard: GuardClient) -> None:
+    """On the clock of the guard; a tick of a command without image says nothing of the kind."""
+    guard.arm("drive", TERMS)
+    guard.channel.time_s = 7.0  # type: ignore[attr-defined]
+    guard.tick("drive", b"go")
+    guard.tick("drive", b"go", 0.5)
+    ticks = [one for one in guard.channel.told if isinstance(one, messages.RenewLease)]  # type: ignore[attr-defined]
+    assert [one.until_s for one in ticks] == [float("inf"), 7.5]

@@ -354,3 +354,34 @@ async def test_the_end_of_a_lease_does_not_wait_for_the_next_look_at_unsent_byte
     assert STOP not in bench.robot.written
     await bench.clock.advance(0.002)
     assert bench.robot.written[-1] == STOP
+
+
+async def test_lease_ends_when_the_image_of_the_operator_is_too_old(bench: Bench) -> None:
+    """Before the lease would end by itself, and without any word of the engine."""
+    await bench.drive()
+    now = bench.clock.now()
+    bench.tell(messages.RenewLease("drive", 2, b"go 2", now, until_s=now + 0.1))
+    await bench.clock.advance(0.09)
+    assert bench.heard() == []
+    await bench.clock.advance(0.02)
+    assert bench.heard() == [messages.StopWritten("drive", "expired", 2)]
+    assert bench.robot.written[-1] == STOP
+
+
+async def test_tick_of_an_image_that_is_too_old_meanwhile_ends_the_motion(bench: Bench) -> None:
+    """It was held up on its way; the lease of an earlier tick does not go on either."""
+    await bench.drive()
+    now = bench.clock.now()
+    bench.tell(messages.RenewLease("drive", 2, b"go 2", now - 0.05, until_s=now))
+    assert bench.heard() == [messages.StopWritten("drive", "expired", 2)]
+    bench.tell(messages.RenewLease("drive", 3, b"go 3", now))
+    assert bench.robot.written == [b"go 1", STOP], "it takes a new gesture"
+
+
+async def test_such_a_tick_moves_no_control_at_rest(bench: Bench) -> None:
+    await bench.drive()
+    bench.tell(messages.ReleaseControl("drive"))
+    count = len(bench.robot.written)
+    now = bench.clock.now()
+    bench.tell(messages.RenewLease("drive", 2, b"go 2", now, until_s=now))
+    assert bench.robot.written[count:] == []

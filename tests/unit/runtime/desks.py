@@ -1,6 +1,7 @@
 """A desk among robots and screens that keep what they are told."""
 
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
 from urc.model.driver import Argument, Command, Driver, TransportSpec
@@ -53,9 +54,9 @@ class Movers:
     def is_armed(self, command: str) -> bool:
         return command not in self.disarmed
 
-    def tick(self, command: str, data: Payload) -> None:
+    def tick(self, command: str, data: Payload, for_s: float = inf) -> None:
         assert isinstance(data, bytes)
-        self.told.append(data.decode())
+        self.told.append(data.decode() if for_s == inf else f"{data.decode()} for {for_s:.2f} s")
 
     def renew(self, command: str, stop: Payload) -> None:
         assert isinstance(stop, bytes)
@@ -104,13 +105,17 @@ class Scene:
         self.now = 100.0
         self._number = 0
 
-    def tick(self, who: str = "ann", command: str = "drive", **arguments: Reading) -> str:
-        """Tick as a page does that has just heard the beat."""
+    def tick(
+        self, who: str = "ann", command: str = "drive", *, sees: float = inf, **arguments: Reading
+    ) -> str:
+        """Tick as a page does that has just heard the beat, and that sees an image of an age."""
         self._number += 1
         self.now += 0.05
         echo = self.controller.heartbeat(who, self.now)
         given = ControlInput(self.controller.lease.state.epoch, self._number, echo)
-        return self.controller.tick(who, command, arguments, given, self.now)
+        if sees == inf:
+            return self.controller.tick(who, command, arguments, given, self.now)
+        return self.controller.tick(who, command, arguments, given, self.now, sees)
 
     def drive(self, who: str, verb: str, **more: Any) -> str:
         """Say something about the controls."""

@@ -12,6 +12,7 @@ import pytest
 from tests.unit.runtime.desks import DRIVER
 from urc.access.directory import Identity
 from urc.guard.goal_reports import GoalReports
+from urc.model.driver import Driver
 from urc.model.role import Role
 from urc.protocol.events import MotionEvent, MotionRefused
 from urc.runtime.audit_entry import AuditEntry
@@ -30,12 +31,12 @@ pytestmark = pytest.mark.anyio
 class Scene:
     """Controls with a robot that is connected."""
 
-    def __init__(self, file: LatchStore | None = None) -> None:
+    def __init__(self, file: LatchStore | None = None, driver: Driver = DRIVER) -> None:
         self.clock = FakeClock()
         self.audit: list[AuditEntry] = []
         recorder = AuditRecorder("rover", self.audit.append, utc=lambda: 99.0)
-        self.controls = ControlService(DRIVER, self.clock, file, recorder)
-        self.frames = FakeFrames(DRIVER)
+        self.controls = ControlService(driver, self.clock, file, recorder)
+        self.frames = FakeFrames(driver)
         self.backend = FakeMotionBackend(self.clock)
         self.on_motion: Callable[[MotionEvent], None] | None = None
         self.hub = Hub({})
@@ -68,7 +69,13 @@ class Scene:
         self.controls.handle(operator, wire.Drive(verb))
         self.read(operator)
 
-    def tick(self, operator: OperatorSession, speed: Any = 0.5, command: str = "drive") -> None:
+    def tick(
+        self,
+        operator: OperatorSession,
+        speed: Any = 0.5,
+        command: str = "drive",
+        sees: tuple[int, int] | None = None,
+    ) -> None:
         """Tick as a page does."""
         self.read(operator)
         self._numbers += 1
@@ -76,14 +83,14 @@ class Scene:
             self.controls.controller.lease.state.epoch,
             self.beats.get(operator.client.id, 0),
         )
-        said = wire.Tick(command, epoch, self._numbers, echo, {"speed": speed})
+        said = wire.Tick(command, epoch, self._numbers, echo, {"speed": speed}, sees)
         self.controls.handle(operator, said)
 
 
 @asynccontextmanager
-async def scene(file: LatchStore | None = None) -> AsyncIterator[Scene]:
+async def scene(file: LatchStore | None = None, driver: Driver = DRIVER) -> AsyncIterator[Scene]:
     """Attach the robot; it is gone after the test."""
-    it = Scene(file)
+    it = Scene(file, driver)
     task = asyncio.create_task(it.controls.serve(it))  # type: ignore[arg-type]  # it has all
     await settle()
     yield it

@@ -47,16 +47,16 @@ def looking_at(*names: str) -> ImageSubscription:
 
 def header(index: int, age_ms: int, now_ms: int) -> bytes:
     """Return what the message of a picture begins with."""
-    return encode_picture(index, JPEG, age_ms, now_ms)[: -len(JPEG)]
+    return encode_picture(index, JPEG, 2**32 + 7, age_ms, now_ms)[: -len(JPEG)]
 
 
 def test_a_picture_says_its_signal_age_time_and_type() -> None:
     """The header is the one that the page reads."""
     message = header(513, 40, 1234)
-    kind, length, index, age_ms, now_ms = struct.unpack(">BBHId", message[:16])
-    assert (kind, index, age_ms, now_ms) == (1, 513, 40, 1234)
-    assert message[16 : 16 + length] == b"image/jpeg"
-    assert len(message) == 16 + length
+    kind, length, index, age_ms, now_ms, number = struct.unpack(">BBHIdI", message[:20])
+    assert (kind, index, age_ms, now_ms, number) == (1, 513, 40, 1234, 7)
+    assert message[20 : 20 + length] == b"image/jpeg"
+    assert len(message) == 20 + length
     assert struct.unpack(">I", header(0, -5, 0)[4:8]) == (0,)
     assert struct.unpack(">I", header(0, 1 << 40, 0)[4:8]) == (2**32 - 1,)
 

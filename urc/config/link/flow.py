@@ -8,8 +8,8 @@ from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
 from urc.config.values import check_within, fit_argument, fit_hint, known_argument
 from urc.expressions import COUNTERS, NONCE, NOW, Template
-from urc.model.driver import Argument, Command, Driver, Poll, Reply
-from urc.model.exchange import ErrorReply, ProvisionalReplies
+from urc.model.driver import Argument, Command, Driver, Poll, Reply, slowed_arguments
+from urc.model.exchange import ErrorReply, ProvisionalReplies, Sight
 from urc.model.payload import ReadSpec, WriteSpec
 
 __all__ = [
@@ -62,6 +62,8 @@ def link_command(linker: Linker, part: Node, command: Command) -> None:
         if release is not None:
             link_arguments(linker.problems, release, command, release.entries(), "release")
         _link_slew(linker.problems, part.must("hold").named("slew"), command)
+        if command.hold.sight is not None:
+            _link_sight(linker, part.must("hold"), command, command.hold.sight)
         if _needs_two(command):
             linker.problems.error(
                 part.must("hold"),
@@ -84,6 +86,29 @@ def _link_slew(problems: Problems, slew: Mapping[str, Node], command: Command) -
             text = f"argument {name!r} {what}, so its value cannot change gradually"
             hint = "limit only numeric arguments that have no choices"
             problems.error(inner, "wrong-type", text, key=True, hint=hint)
+
+
+def _link_sight(linker: Linker, part: Node, command: Command, sight: Sight) -> None:
+    """Check that `sees` names an image, and that `slow_after` has a speed to reduce."""
+    problems, signals = linker.problems, linker.driver.signals
+    inner, signal = part.must("sees"), signals.get(sight.signal)
+    if signal is None:
+        problems.unknown(inner, "unknown-signal", sight.signal, signals)
+    elif signal.type not in ("image", "video"):
+        problems.error(
+            inner,
+            "wrong-type",
+            f"signal {sight.signal!r} is of type {signal.type}, which shows the operator nothing",
+            hint="name a signal of type image or video",
+        )
+    if sight.slow_after_s is not None and not slowed_arguments(command):
+        problems.error(
+            part.must("slow_after"),
+            "wrong-command",
+            f"{command.name!r} has no speed that could fall with the age of the image",
+            hint="leave 'slow_after' out; only numeric arguments without choices are slowed, if"
+            " 'release' names them or their default is 0",
+        )
 
 
 def link_requirements(linker: Linker, part: Node, command: Command) -> None:

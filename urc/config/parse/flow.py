@@ -6,7 +6,7 @@ from typing import Final, Literal, cast
 
 from urc.config.autonomous_motion import parse_moves
 from urc.config.messaging import MESSAGING
-from urc.config.node import Node, Problems
+from urc.config.node import Node, Problems, shown_duration
 from urc.config.parse.form import FormContext, parse_write
 from urc.config.parse.reply import parse_errors, refuse
 from urc.config.parse.steps import StepContext, parse_steps
@@ -23,6 +23,7 @@ from urc.model.exchange import (
     Queue,
     Requirement,
     Retry,
+    Sight,
     Verify,
 )
 from urc.model.payload import WriteSpec
@@ -331,7 +332,39 @@ def _hold(part: Node, command: Command, problems: Problems) -> Hold:
     values = {name: given(inner.data) for name, inner in entries.items()}
     slew = {name: float(inner.data) for name, inner in part.named("slew").items()}
     on_stall = cast("Literal['abort', 'wait'] | None", part.text("on_stall") or None)
-    return Hold(repeat_s, values, lease_s, _watchdog_s(part, problems), slew, on_stall, step_s)
+    watchdog_s, sight = _watchdog_s(part, problems), _sight(part, problems)
+    return Hold(repeat_s, values, lease_s, watchdog_s, slew, on_stall, step_s, sight)
+
+
+def _sight(part: Node, problems: Problems) -> Sight | None:
+    """Return the image that the operator must see, or None."""
+    signal = part.text("sees")
+    if not signal:
+        why = "has no effect without 'sees', which names the image that the operator must see"
+        refuse(part, ("slow_after", "stop_after"), why, problems)
+        return None
+    if "stop_after" not in part.data:
+        problems.error(
+            part,
+            "missing-key",
+            "'stop_after' is missing, so no image would be too old to drive by",
+            key=True,
+            hint="write the age at which the motion ends, such as stop_after: 700ms",
+        )
+    stop_s = problems.duration(part, "stop_after", 5.0, least=0.2, most=5.0)
+    slow = part.get("slow_after")
+    if slow is None:
+        return Sight(signal, stop_s)
+    slow_s = problems.duration(part, "slow_after", 0.05, least=0.05, most=5.0)
+    if slow_s >= stop_s:
+        problems.error(
+            slow,
+            "out-of-range",
+            f"expected less than 'stop_after', which is {shown_duration(stop_s)},"
+            f" found {shown_duration(slow_s)}",
+            hint="the speed falls between both ages; leave 'slow_after' out to keep the speed",
+        )
+    return Sight(signal, stop_s, slow_s)
 
 
 def _rest_of(command: Command) -> str:

@@ -12,6 +12,7 @@ from typing import Literal
 
 from urc.model.driver import Driver
 from urc.model.role import Role, includes
+from urc.motion.driving_lock import BLIND_S, SeenImage
 from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import StopReport
 from urc.motion.lease import LeaseState, Operator
@@ -21,6 +22,7 @@ from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, Timer
 from urc.runtime.hub import Hub, LogEntry
+from urc.runtime.image_interlock import OLD_IMAGE, ImageInterlock
 from urc.runtime.latch import Latch, LatchStore
 from urc.runtime.loop_watchdog import TOO_LATE_S, LoopWatchdog
 from urc.runtime.motion_controller import MotionBackend, MotionController
@@ -85,6 +87,11 @@ class ControlService:
     def operators(self) -> tuple[OperatorSession, ...]:
         """The sessions of all the robot's pages."""
         return tuple(self._operators.values())
+
+    @property
+    def images(self) -> ImageInterlock:
+        """The images that the held commands require."""
+        return self.controller.images
 
     @property
     def commands(self) -> tuple[str, ...]:
@@ -241,7 +248,9 @@ class ControlService:
             operator.seen = self._number
             controller, now = self.controller, self._clock.now()
             is_certain = controller.is_certain
-            texts.append(operator.lease(controller.lease.state, now, is_confirmed=is_certain))
+            left_s = controller.images.override_s(now)
+            state = controller.lease.state
+            texts.append(operator.lease(state, now, is_confirmed=is_certain, override_s=left_s))
         texts += operator.notices.values()
         operator.notices.clear()
         if operator.heartbeat is not None:
@@ -338,6 +347,9 @@ class ControlService:
             self.recorder.refused(operator.client, said.verb, reason, now)
         elif said.verb == "reset":
             self.once.reset()
+        elif said.verb == "override":
+            epoch, for_s = self.controller.lease.state.epoch, self.images.override_s(now)
+            self.recorder.overrode(operator.client, epoch, for_s)
         self._set_expiry()
 
     def _scope_refusal(self, operator: OperatorSession, verb: wire.Verb) -> str:
@@ -405,7 +417,10 @@ class ControlService:
         if not reason and not operator.rights.may_give(command):
             reason = OUT_OF_SCOPE
         if not reason:
-            reason = self.controller.tick(operator.client.id, command, tick.arguments, given, now)
+            age_s = self._image_age_s(operator, tick, now)
+            reason = self.controller.tick(
+                operator.client.id, command, tick.arguments, given, now, age_s
+            )
         if not reason:
             operator.moved_s[command] = operator.moved_at_s = now
         elif now - operator.moved_s.get(command, float("-inf")) > PATIENCE_S or self._is_closed(
@@ -413,6 +428,14 @@ class ControlService:
         ):
             operator.notice(command, wire.encode_refused("tick", command, reason))
             self.recorder.refused(operator.client, command, reason, now)
+
+    def _image_age_s(self, operator: OperatorSession, tick: wire.Tick, now: float) -> float:
+        """Return the age of the image that the page shows of the command's signal."""
+        signal = self.images.signal_of(tick.command)
+        if not signal or tick.sees is None:
+            return BLIND_S
+        number, shown_ms = tick.sees
+        return operator.images.age_s(signal, SeenImage(number, shown_ms / 1000), now)
 
     def _is_closed(self, given: ControlInput) -> bool:
         return given.epoch != self.controller.lease.state.epoch
@@ -423,12 +446,16 @@ class ControlService:
         self.controller.stopped(command, reason)
         if reason == "lost":
             return  # the stop is written again, and then reported
-        self.recorder.stopped(command, reason, self._clock.now())
+        is_blind = reason == "expired" and self.controller.was_blind(command)
+        self.recorder.stopped(command, OLD_IMAGE if is_blind else reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the operator released the control, or the lease message reports the stop
         for operator in self._operators.values():
             operator.moved_s.pop(command, None)
-            operator.notice(command, wire.encode_stopped(command, reason))
+            text = wire.encode_stopped(command, reason)
+            if is_blind:
+                text = wire.encode_refused("tick", command, OLD_IMAGE)
+            operator.notice(command, text)
 
     def _refused(self, command: str, why: str) -> None:
         """Tell every page why the robot refused the motion."""

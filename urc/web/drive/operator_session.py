@@ -7,6 +7,7 @@ import secrets
 from collections.abc import Callable
 from typing import Final, Protocol
 
+from urc.motion.driving_lock import SentImages
 from urc.motion.freshness import DuplicateElimination
 from urc.motion.lease import LeaseState, Operator
 from urc.motion.rate_limiter import RateLimiter
@@ -61,6 +62,8 @@ class OperatorSession:
         """Time at which the last tick of each control was applied, in seconds."""
         self.moved_at_s = float("-inf")
         """Time at which the last tick of any control was applied, in seconds."""
+        self.images = SentImages()
+        """The images that the page has received, for the driving lock."""
         self.key = secrets.token_urlsafe(16)
         """Secret key that a redundant socket needs in order to join the page."""
         self.spare: RedundantLine | None = None
@@ -79,11 +82,18 @@ class OperatorSession:
         self.notices[key] = text
         self.wake()
 
-    def lease(self, state: LeaseState, now: float, *, is_confirmed: bool) -> str:
+    def lease(
+        self, state: LeaseState, now: float, *, is_confirmed: bool, override_s: float = 0.0
+    ) -> str:
         """Return the lease message for the page."""
         left_s = max(0.0, state.asked_until - now) if state.asked_by is not None else 0.0
         return wire.encode_lease(
-            state, self.client, left_s=left_s, is_confirmed=is_confirmed, spare=self.key
+            state,
+            self.client,
+            left_s=left_s,
+            is_confirmed=is_confirmed,
+            spare=self.key,
+            override_s=override_s,
         )
 
     def is_first(self, about: str, number: int) -> bool:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from urc.model.values import NOTHING, Sample
+from urc.motion.driving_lock import SentImages
 from urc.runtime.clock import Clock, LoopClock, Timer
 from urc.runtime.hub import Hub
 from urc.web.feed.image_cache import ImageCache, ImageSubscription, is_picture
@@ -25,7 +26,7 @@ from urc.web.wire.messages import (
     encode_topics,
     encode_values,
 )
-from urc.web.wire.picture import as_frame
+from urc.web.wire.picture import NUMBERS, as_frame
 
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 
@@ -60,6 +61,8 @@ class Place:
     known: FanoutPosition = field(default_factory=FanoutPosition)
     subscription: ImageSubscription = field(default_factory=ImageSubscription)
     videos: VideoSubscription = field(default_factory=VideoSubscription)
+    images: SentImages = field(default_factory=SentImages, compare=False)
+    """The images that the client has received, for the driving lock."""
     shown: tuple[str, ...] = ()
     """Signals of both subscriptions, counted as viewed."""
 
@@ -193,6 +196,12 @@ class Fanout:
         viewers = self.hub.viewers
         viewers.remove(place.shown)
         place.shown = shown
+        for name in place.videos.names:
+            if name in stills:
+                place.images.forget(name)  # images and access units have different numbers
+        for name in place.subscription.names:
+            if name in is_video:
+                place.images.forget(name)
         place.videos.show(name for name in shown if name in is_video)
         place.subscription.show(name for name in shown if name not in is_video)
         viewers.add(shown)
@@ -200,12 +209,18 @@ class Fanout:
 
     def next_picture(self, place: Place) -> bytes | None:
         """Return the frame with the next image or access unit for the client; None if none."""
-        if place.videos.names and (frame := self.videos.next_frame(place.videos)) is not None:
-            return frame
+        if place.videos.names:
+            frame = self.videos.next_frame(place.videos, place.images)
+            if frame is not None:
+                return frame
         if not place.subscription.names:
             return None
         picture = self.cache.next_image(place.subscription)
-        return None if picture is None else picture.frame
+        if picture is None:
+            return None
+        number, sample = picture.number % NUMBERS, picture.sample
+        place.images.sent(sample.signal, number, sample.time_s, self._clock.now())
+        return picture.frame
 
     def leave(self, wake: Callable[[], None], place: Place) -> None:
         """Stop calling `wake`; the client at `place` has left."""

@@ -93,6 +93,8 @@ class ImageCache:
         else:
             return known
         age_s, index = now_s - sample.time_s, self._hub.index[name]
-        message = encode_picture(index, sample.value, round(age_s * 1000), round(now_s * 1000))
+        message = encode_picture(
+            index, sample.value, number, round(age_s * 1000), round(now_s * 1000)
+        )
         made = self._encoded[name] = EncodedImage(as_frame(message), sample, number, now_s)
         return made

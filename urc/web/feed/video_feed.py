@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 from typing import Final
 
 from urc.model.values import Sample
+from urc.motion.driving_lock import SentImages
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
 from urc.video import VideoUnit, read_unit
-from urc.web.wire.picture import as_frame, encode_video
+from urc.web.wire.picture import NUMBERS, as_frame, encode_video
 
 __all__ = ["GROUP_BYTES", "GROUP_UNITS", "VideoFeed", "VideoGroup", "VideoSubscription"]
 
@@ -22,6 +23,7 @@ GROUP_UNITS: Final = 1500
 """Maximum number of access units in a group: 25 s at 60 images a second."""
 SHARED_FOR_S: Final = 0.05
 """Maximum age at which an encoded unit is reused, in seconds, as for images."""
+_UNRECORDED: Final = SentImages()
 _LATE_S: Final = 60.0
 """Longest credible time between arrival and reading of a unit, in seconds. A recording contains
 arrival times of another computer."""
@@ -117,8 +119,13 @@ class VideoFeed:
                 if self.heard is not None:
                     self.heard(sample.signal, sample.value, unit)
 
-    def next_frame(self, subscription: VideoSubscription) -> bytes | None:
-        """Return the frame with the page's next access unit, and mark it as sent; None if none."""
+    def next_frame(
+        self, subscription: VideoSubscription, images: SentImages = _UNRECORDED
+    ) -> bytes | None:
+        """Return the frame with the page's next access unit, and mark it as sent; None if none.
+
+        `images` records the unit as sent to the page.
+        """
         count = len(subscription.names)
         for step in range(count):
             name = subscription.names[(subscription.turn + step) % count]
@@ -127,6 +134,7 @@ class VideoFeed:
             if kept is not None:
                 subscription.turn = (subscription.turn + step + 1) % count
                 subscription.seen[name] = kept.number
+                images.sent(name, kept.number % NUMBERS, kept.time_s, self._clock.now())
                 return self._frame(name, kept)
         return None
 

@@ -15,7 +15,7 @@ from urc.model.profile import Profile
 from urc.model.values import NOTHING, Reading, Signal
 from urc.web import words
 from urc.web.show.layout import needs_turning
-from urc.web.show.outputs import asked_before
+from urc.web.show.outputs import asked_before, sight_config
 
 __all__ = [
     "DEBUGGING",
@@ -148,6 +148,7 @@ def _command(command: Command, driver: Driver) -> dict[str, object]:
         "steps": len(command.steps),
         "isAnswered": command.reply is not None or bool(command.steps),
         "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
+        "sees": sight_config(hold),
         "asks": asked_before(command),
         "requires": [one.text for one in command.requires],
         "arguments": [_argument(one, release) for one in command.arguments.values()],

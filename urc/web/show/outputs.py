@@ -8,13 +8,21 @@ from collections.abc import Mapping
 from urc.model import sequence
 from urc.model.binding import targets
 from urc.model.driver import Argument, Command, Driver
+from urc.model.exchange import Hold
 from urc.model.interface import OutputBinding, WidgetUse
 from urc.model.units import conversion
 from urc.model.values import Reading
 from urc.model.widget import Widget, WidgetPort
 from urc.runtime.one_shot_commands import HELD, needs_holding
 
-__all__ = ["asked_before", "inputs_config", "motion_lines", "output_config", "opens_on_demand"]
+__all__ = [
+    "asked_before",
+    "inputs_config",
+    "motion_lines",
+    "opens_on_demand",
+    "output_config",
+    "sight_config",
+]
 
 _NO_PORT = WidgetPort("")
 _NOTHING_GIVEN = OutputBinding()
@@ -60,12 +68,22 @@ def output_config(use: WidgetUse, output: str, widget: Widget, driver: Driver) -
         "role": command.role if command is not None else "drive",
         "mayMove": command is not None and command.moves,
         "leaseMs": round(hold.lease_s * 1000) if hold is not None else 0,
+        "sees": sight_config(hold),
         "title": (command and command.title) or "",
         "arguments": _arguments(command, given),
         "asks": asked_before(command),
         "steps": [_step_words(one) for one in command.steps] if command is not None else [],
         "isAnswered": command is not None and (command.reply is not None or bool(command.steps)),
     }
+
+
+def sight_config(hold: Hold | None) -> dict[str, object] | None:
+    """Return the image that a held command requires, for ``shown_images.js``; None if none."""
+    if hold is None or hold.sight is None:
+        return None
+    signal, stop_s, slow_s = hold.sight
+    slow_ms = None if slow_s is None else round(slow_s * 1000)
+    return {"signal": signal, "stopMs": round(stop_s * 1000), "slowMs": slow_ms}
 
 
 def _moves(command: Command, given: OutputBinding) -> bool:

@@ -60,9 +60,24 @@ def command_of(data: bytes) -> str:
 
 
 def encode_lease(
-    state: LeaseState, you: Operator, *, left_s: float, is_confirmed: bool, spare: str = ""
+    state: LeaseState,
+    you: Operator,
+    *,
+    left_s: float,
+    is_confirmed: bool,
+    spare: str = "",
+    override_s: float = 0.0,
 ) -> str:
-    """Return the lease message for a page; `spare` is the key for the page's redundant socket."""
+    """Return the lease message for a page.
+
+    Args:
+        state: the state of the lease.
+        you: the page's operator.
+        left_s: time until the asking page gets the controls, in seconds.
+        is_confirmed: whether the last stop is confirmed.
+        spare: key for the page's redundant socket.
+        override_s: time for which the holder may still drive without an image, in seconds.
+    """
     return encoded(
         LeaseMessage(
             you=you.id,
@@ -78,6 +93,7 @@ def encode_lease(
             forces=includes(you.role, "maintain"),
             spare=spare if includes(you.role, "drive") else "",
             role=you.role,
+            override=milliseconds(override_s),
         )
     )
 

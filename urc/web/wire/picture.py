@@ -11,27 +11,31 @@ from urc.images import media_type
 from urc.video import VideoUnit
 from urc.wire.picture import PICTURE, PICTURE_HEADER, VIDEO, VIDEO_HEADER
 
-__all__ = ["as_frame", "encode_picture", "encode_video"]
+__all__ = ["NUMBERS", "as_frame", "encode_picture", "encode_video"]
 
 _OLDEST_MS = 2**32 - 1
+NUMBERS = 2**32
+"""Number of different image numbers; later images repeat them."""
 _FINAL_TEXT, _FINAL_BINARY = b"\x81", b"\x82"
 _SHORT, _MEDIUM = 126, 1 << 16
 """Frame lengths below `_SHORT` need one byte, lengths below `_MEDIUM` need three bytes, and all
 other lengths need nine bytes."""
 
 
-def encode_picture(index: int, data: bytes, age_ms: int, now_ms: int) -> bytes:
+def encode_picture(index: int, data: bytes, number: int, age_ms: int, now_ms: int) -> bytes:
     """Return the binary message with an image.
 
     Args:
         index: index of the signal in the `names` of `HelloMessage`.
         data: the robot's image.
+        number: number of the image, by which a page names it.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.
     """
     kind = media_type(data).encode("ascii")
     age_ms = min(max(age_ms, 0), _OLDEST_MS)
-    return PICTURE_HEADER.pack(PICTURE, len(kind), index, age_ms, now_ms) + kind + data
+    number %= NUMBERS
+    return PICTURE_HEADER.pack(PICTURE, len(kind), index, age_ms, now_ms, number) + kind + data
 
 
 def encode_video(index: int, unit: VideoUnit, number: int, age_ms: int, now_ms: int) -> bytes:
@@ -47,7 +51,7 @@ def encode_video(index: int, unit: VideoUnit, number: int, age_ms: int, now_ms: 
     codec = unit.codec.encode("ascii")
     head = VIDEO_HEADER.pack(
         *(VIDEO, len(codec), index, min(max(age_ms, 0), _OLDEST_MS), now_ms),
-        *(number % 2**32, unit.width, unit.height, unit.is_key),
+        *(number % NUMBERS, unit.width, unit.height, unit.is_key),
     )
     return head + codec + unit.data
 

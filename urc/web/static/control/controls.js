@@ -13,7 +13,7 @@ import { inTurn } from "../core/formatting.js";
 import { said, t } from "../core/words.js";
 
 /** @type {Verb[]} */
-const VERBS = ["reset", "take", "ask", "force", "yes", "no", "leave"];
+const VERBS = ["reset", "take", "ask", "force", "yes", "no", "override", "leave"];
 /** Duration of the ring around Reset after a press on a stopped control. */
 const POINTED_MS = 1500;
 /** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
@@ -115,6 +115,7 @@ export class Controls {
       force: isOthers && may && lease.forces,
       yes: isAsked,
       no: isAsked,
+      override: isMine && !isAsked && drive.overrideMs <= nowMs && this.input.isBlind(nowMs),
       leave: isMine && !isAsked,
     };
     const left = this.buttons.find(([verb, button]) => !shown[verb] && button.matches(BEFORE_DRIVING.has(verb) ? ":focus" : ":focus-visible"))?.[0];
@@ -123,7 +124,7 @@ export class Controls {
     }
     if (left) this.moveFocus(left);
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
-    const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS);
+    const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS, (drive.overrideMs - nowMs) / 1000);
     if (this.who.textContent !== text) this.who.textContent = text;
     const stopped = isLatched ? this.stoppedWords() : "";
     if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
@@ -147,12 +148,14 @@ export class Controls {
    * @param {boolean} isAsked
    * @param {boolean} iAsk
    * @param {number} leftS
+   * @param {number} blindS time for which this page may still drive without an image
    */
-  words(isMine, isAsked, iAsk, leftS) {
+  words(isMine, isAsked, iAsk, leftS, blindS) {
     const lease = this.drive.lease;
     if (!lease) return this.drive.socket.refusal ? t("Not connected to the robot") : t("Not connected to URC");
     const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
     if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
+    if (isMine && blindS > 0) return t("▲ You drive without an image: {seconds} s", { seconds: Math.ceil(blindS) });
     if (isMine) return t("● You drive");
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });

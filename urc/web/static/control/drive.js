@@ -4,7 +4,7 @@
  *
  * @typedef {import("../core/types.js").Lease} Lease
  * @typedef {import("../live/socket.js").Socket} Socket
- * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset"} Verb
+ * @typedef {"take" | "ask" | "yes" | "no" | "force" | "leave" | "reset" | "override"} Verb
  * @typedef {"" | "sending" | "sent" | "failed"} StopPhase State of the last press of STOP, until the
  *   lease reports the latch.
  */
@@ -72,6 +72,8 @@ export class Drive {
     this.pressed = null;
     /** Time at which the asking page gets the controls, on this page's clock. */
     this.handedMs = 0;
+    /** Time until which this page may drive without an image, on its clock. */
+    this.overrideMs = 0;
     /** @type {number | undefined} */
     this.timer = undefined;
   }
@@ -100,6 +102,7 @@ export class Drive {
     this.stops = lease.stops;
     this.lease = lease;
     this.handedMs = nowMs + lease.left;
+    this.overrideMs = this.isMine ? nowMs + (lease.override ?? 0) : 0;
     if (!this.isMine) this.beat = this.beatMs = 0;
     if (this.isMine !== wasMine || lease.latched) this.refusal = "";
     // A latch from before the press is no answer to it.
@@ -181,7 +184,7 @@ export class Drive {
       this.posted = { latched: this.lease.latched, confirmed: this.lease.confirmed };
     }
     this.lease = null;
-    this.beat = this.beatMs = 0;
+    this.beat = this.beatMs = this.overrideMs = 0;
     this.double();
     this.changed();
   }

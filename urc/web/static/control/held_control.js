@@ -18,6 +18,7 @@
  *   this one may keep its position.
  * @property {(grip: HeldControl) => void} end
  * @property {(grip: HeldControl) => void} forget
+ * @property {(control: Control) => string} [slowNote] Why the robot moves more slowly than requested, or "".
  */
 import { isDown } from "./pointer_capture.js";
 import { takesKeys, takesText } from "./keys.js";
@@ -51,6 +52,11 @@ export class Control {
     this.sentMs = -Infinity;
     this.sent = "";
     this.isReleaseOwed = false;
+  }
+
+  /** The image that the command requires; undefined if none. */
+  get sight() {
+    return [...this.grips][0]?.output.sees;
   }
 
   /** Time for which motion continues after the last tick. */
@@ -288,7 +294,8 @@ export class HeldControl {
     const { phase, together } = this.control;
     const lost = together.lost(this);
     const values = this.counted(lost);
-    const reason = this.control.reason || (lost.size > 0 ? t("Another control sets this value: let go, then start again") : "");
+    const slow = this.holder.slowNote?.(this.control) ?? "";
+    const reason = this.control.reason || slow || (lost.size > 0 ? t("Another control sets this value: let go, then start again") : "");
     const kind = this.hand?.kind ?? "";
     const look = `${phase} ${reason} ${kind} ${JSON.stringify(values)}`;
     if (look === this.shown && !isForced) return;

@@ -16,6 +16,7 @@
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
  */
 import { DeadMan } from "./dead_man.js";
+import { ShownImages } from "./shown_images.js";
 import { ANY, Control, HeldControl } from "./held_control.js";
 import { Gamepads } from "./gamepad.js";
 import { said, t } from "../core/words.js";
@@ -32,6 +33,7 @@ export class Input {
   /** @param {Drive} drive */
   constructor(drive) {
     this.drive = drive;
+    this.images = new ShownImages();
     /** @type {Map<string, Control>} */
     this.controls = new Map();
     /** @type {Set<HeldControl>} */
@@ -413,11 +415,31 @@ export class Input {
     const text = JSON.stringify(values);
     if (text === control.sent && nowMs - control.sentMs < TICK_MS) return;
     if (!drive.isFree) return; // wait for an empty buffer, so that the newest tick is sent first
-    const { command, epoch } = control;
-    const tick = { t: "tick", command, arguments: values, epoch, echo: drive.beat };
+    const { command, epoch, sight } = control;
+    const sees = sight && this.images.report(sight.signal, nowMs);
+    const tick = { t: "tick", command, arguments: values, epoch, echo: drive.beat, ...(sees && { sees }) };
     control.isReleaseOwed = drive.tell(tick, true);
     control.sent = text;
     control.sentMs = nowMs;
+  }
+
+  /** Whether the page shows no current image for a command that requires one. @param {number} nowMs */
+  isBlind(nowMs) {
+    const sights = [...this.grips].map(({ output: { sees } }) => sees);
+    return sights.some((sight) => sight && this.images.share(sight, nowMs) === 0);
+  }
+
+  /**
+   * Return why a held control moves more slowly than requested; "" if it does not.
+   *
+   * @param {Control} control
+   */
+  slowNote({ phase, sight }) {
+    if (phase !== "held" || !sight) return "";
+    const nowMs = performance.now();
+    const share = this.images.share(sight, nowMs);
+    if (this.drive.overrideMs > nowMs) return share === 0 ? t("Driving without an image") : "";
+    return share === 1 ? "" : t("Old image: {percent} % of the speed", { percent: Math.round(10 * share) * 10 });
   }
 
   /** @param {HeldControl} grip */

@@ -34,6 +34,7 @@ const SIGNS = {
   stopped: mark("■ stopped"),
   refused: mark("▲ refused"),
   lease: mark("◆ controls"),
+  override: mark("▲ override"),
   STOP: mark("■ STOP"),
   reset: mark("◆ reset"),
   ran: mark("→ command"),
@@ -54,7 +55,7 @@ const SIGNS = {
   clock: mark("▲ clock"),
 };
 /** @type {Readonly<Record<string, "warning" | "error">>} */
-const LEVELS = { refused: "warning", "sign-in failed": "warning", clock: "warning", lost: "error", STOP: "error" };
+const LEVELS = { refused: "warning", override: "warning", "sign-in failed": "warning", clock: "warning", lost: "error", STOP: "error" };
 
 /** @param {string} what @returns {string} an English text for `t` */
 export function signOf(what) {

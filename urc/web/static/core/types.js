@@ -47,10 +47,16 @@
  * @property {Blob} blob
  * @property {string} type Media type, such as "image/jpeg".
  * @property {number} serial Increases with each new image.
+ * @property {string} signal
+ * @property {number} number Number of the image on the server.
+ * @property {number} timeMs Time of the image on this page's clock.
  *
  * @typedef {object} VideoImage A decoded image of a video.
  * @property {ImageBitmap} bitmap Closed as soon as the next image is stored; copy it to keep it.
  * @property {number} serial Increases with each new image.
+ * @property {string} signal
+ * @property {number} number Number of its access unit.
+ * @property {number} timeMs Time of the image on this page's clock.
  *
  * @typedef {object} Conversion Conversion from a signal's unit to another: value · factor + offset.
  * @property {number} factor
@@ -163,6 +169,7 @@
  * @property {boolean} forces Whether this page may take control from another page.
  * @property {string} spare Key for the redundant socket; "" if the page may not open one.
  * @property {Role | null} role Role of this page at the robot.
+ * @property {number} [override] Time for which the holder may still drive without an image, in milliseconds.
  *
  * @typedef {"watch" | "drive" | "maintain" | "administer"} Role Rights at a robot; each role includes
  *   the rights of the previous roles.
@@ -271,6 +278,9 @@
  *   Decodes the images of an input. Only the newest image counts; late images are dropped. The
  *   bitmap is closed when the next one arrives, so draw it immediately. `failed` receives an image
  *   that the browser cannot decode.
+ * @property {(image: import("../control/shown_images.js").Numbered) => void} shown Reports that an image is drawn,
+ *   for commands that require the operator to see it. `picture` reports its images automatically. In a
+ *   frame, `shown` has no effect.
  * @property {(input: string, places: readonly number[]) => void} look Selects the visible images of
  *   an input by their indexes from 0; the server sends only these. By default, all images are
  *   visible.

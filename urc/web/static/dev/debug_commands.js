@@ -17,6 +17,7 @@
  * @property {number} steps
  * @property {boolean} isAnswered
  * @property {number} leaseMs 0 for a command without hold
+ * @property {import("../control/shown_images.js").Sight | null} sees image that a held command requires
  * @property {import("../core/types.js").Question[]} asks
  * @property {string[]} requires
  * @property {(Argument & {description: string})[]} arguments
@@ -97,6 +98,7 @@ export class DebugCommands {
       refusal: "",
       isHeld: true,
       leaseMs: command.leaseMs,
+      sees: command.sees,
       isAnswered: false,
       title: command.title,
       arguments: {},

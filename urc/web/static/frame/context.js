@@ -85,6 +85,8 @@ export function contextOf(frame, options) {
     picture: (/** @type {string} */ input, /** @type {Shows} */ show, /** @type {((blob: Blob) => void) | undefined} */ failed) => {
       picture(frame, input, show, failed);
     },
+    // The page cannot verify what a third-party widget draws, so its images do not permit motion.
+    shown: () => {},
     look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => frame.say({ t: "look", input, places }),
     t,
     unit: (/** @type {string} */ input) => unit(frame, input),

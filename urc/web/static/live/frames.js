@@ -5,18 +5,19 @@
  *
  *     0  u8   1: an image             4  u32  its age in milliseconds at the moment of sending
  *     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
- *     2  u16  index of the signal    16       media type in ASCII, then the bytes
+ *     2  u16  index of the signal    16  u32  number of the image
+ *                                    20       media type in ASCII, then the bytes
  *
  * @typedef {object} BinaryFrame
  * @property {number} index
  * @property {number} ageMs
  * @property {number} sentMs
+ * @property {number} number Number of the image; those of one video are consecutive.
  * @property {string} type media type, or the codec string of a video
  * @property {Uint8Array<ArrayBuffer>} bytes
  * @property {VideoPart} [video] Only for an access unit.
  *
  * @typedef {object} VideoPart
- * @property {number} number Number of the access unit within its signal.
  * @property {number} width pixels
  * @property {number} height
  * @property {boolean} isKey Whether decoding can start with this access unit.
@@ -24,7 +25,7 @@
 
 const PICTURE = 1;
 const VIDEO = 2;
-const HEADER = 16;
+const HEADER = 20;
 const VIDEO_HEADER = 25;
 
 /**
@@ -43,12 +44,12 @@ export function frameOf(data) {
     index: view.getUint16(2),
     ageMs: view.getUint32(4),
     sentMs: view.getFloat64(8),
+    number: view.getUint32(16),
     type: String.fromCharCode(...letters),
     bytes: new Uint8Array(data, header + typeLength),
   };
   if (kind === PICTURE) return frame;
   const video = {
-    number: view.getUint32(16),
     width: view.getUint16(20),
     height: view.getUint16(22),
     isKey: view.getUint8(24) === 1,

@@ -251,6 +251,7 @@ function take(message) {
       screenName.tell();
       alarms.clear();
       videos.keep([]);
+      input.images.clear();
       shown = "[[],[]]"; // a new connection sends no images before a request
       break;
     case "alarms":

@@ -155,12 +155,12 @@ export class Store {
    * @param {import("./frames.js").BinaryFrame} frame
    * @param {number} nowMs
    */
-  picture({ index, sentMs, ageMs, type, bytes }, nowMs) {
+  picture({ index, sentMs, ageMs, number, type, bytes }, nowMs) {
     const timeMs = nowMs - this.lagMs(sentMs, nowMs) - ageMs;
     const name = this.names[index];
     if (name === undefined) return;
     this.serial += 1;
-    const image = { blob: new Blob([bytes], { type }), type, serial: this.serial };
+    const image = { blob: new Blob([bytes], { type }), type, serial: this.serial, signal: name, number, timeMs };
     const value = { bytes: bytes.byteLength };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, image });
   }
@@ -182,12 +182,13 @@ export class Store {
    * @param {string} name
    * @param {ImageBitmap} bitmap
    * @param {number} timeMs
+   * @param {number} number number of its access unit
    */
-  videoImage(name, bitmap, timeMs) {
+  videoImage(name, bitmap, timeMs, number) {
     this.serial += 1;
     this.samples.get(name)?.video?.bitmap.close();
     const value = { bytes: bitmap.width * bitmap.height };
-    const video = { bitmap, serial: this.serial };
+    const video = { bitmap, serial: this.serial, signal: name, number, timeMs };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, video });
   }
 

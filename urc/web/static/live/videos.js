@@ -44,16 +44,16 @@ export class Videos {
    * @param {number} nowMs
    */
   take(frame, nowMs) {
-    const { video } = frame;
+    const { video, number } = frame;
     const timeMs = this.store.timeOf(frame, nowMs);
     const signal = this.store.names[frame.index];
     if (!video || signal === undefined || this.stills.has(signal)) return;
     const times = this.times.get(signal) ?? new Map();
     this.times.set(signal, times);
     if (times.size >= MOST_TIMES) times.clear();
-    times.set(video.number, timeMs);
+    times.set(number, timeMs);
     const data = frame.bytes.slice().buffer;
-    this.decoder().postMessage({ signal, number: video.number, isKey: video.isKey, codec: frame.type, data }, [data]);
+    this.decoder().postMessage({ signal, number, isKey: video.isKey, codec: frame.type, data }, [data]);
   }
 
   /** Return the names of the shown videos that the page cannot decode. @param {readonly string[]} shown */
@@ -87,20 +87,20 @@ export class Videos {
       return;
     }
     const times = this.times.get(signal);
-    const timeMs = times?.get(number ?? -1);
     if (!bitmap) return;
-    if (timeMs === undefined) {
+    const timeMs = times?.get(number ?? -1);
+    if (number === undefined || timeMs === undefined) {
       bitmap.close();
       return;
     }
-    times?.delete(number ?? -1);
+    times?.delete(number);
     for (const known of times?.keys() ?? []) {
-      if (known > (number ?? 0) - MOST_REORDERED) break;
+      if (known > number - MOST_REORDERED) break;
       times?.delete(known);
     }
     const faults = this.faults.get(signal);
     if (faults && (faults.images += 1) >= FORGIVEN_AFTER) this.faults.delete(signal);
-    this.store.videoImage(signal, bitmap, timeMs);
+    this.store.videoImage(signal, bitmap, timeMs, number);
     this.changed();
   }
 

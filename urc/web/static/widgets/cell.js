@@ -36,7 +36,7 @@
  * @property {(wish: import("../core/types.js").PendingValue) => void} drive
  * @property {() => void} wake requests an animation frame
  * @property {() => void} again requests an animation frame only for widgets
- * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "stopReason" | "hindrance" | "lacks" | "isDriving"> & {pads: PadDesk}} input
+ * @property {Pick<import("../control/input.js").Input, "hold" | "gate" | "gated" | "letGo" | "refusal" | "stopReason" | "hindrance" | "lacks" | "isDriving" | "images"> & {pads: PadDesk}} input
  * @property {Pick<import("../control/stop.js").StopButton, "press" | "follow">} stop
  * @property {Pick<import("../live/page_topics.js").PageTopics, "listen">} follows
  * @property {import("../alarms/demo_alarms.js").AlarmDoor} alarms

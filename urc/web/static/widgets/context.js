@@ -7,6 +7,7 @@
  * @typedef {import("../core/types.js").GateSpec} GateSpec
  * @typedef {import("../core/types.js").Given} Given
  * @typedef {import("../core/types.js").HoldSpec} HoldSpec
+ * @typedef {import("../core/types.js").Picture} Picture
  * @typedef {import("../core/types.js").Reading} Reading
  * @typedef {import("../core/types.js").StopState} StopState
  * @typedef {import("../core/types.js").Topics} Topics
@@ -70,6 +71,7 @@ export function contextOf(cell) {
     picture: (/** @type {string} */ input, /** @type {Shows} */ show, /** @type {((blob: Blob) => void) | undefined} */ failed) => {
       picture(cell, input, show, failed);
     },
+    shown: (/** @type {import("../control/shown_images.js").Numbered} */ image) => doors.input.images.show(image, performance.now()),
     look: (/** @type {string} */ input, /** @type {readonly number[]} */ places) => cell.look(input, places),
     t,
     unit: (/** @type {string} */ input) => unit(cell, input),
@@ -147,11 +149,13 @@ function each(cell, input, listener) {
 function picture(cell, input, show, failed) {
   /** @type {Reading | null} */
   let newest = null;
-  const draw = cell.guarded((/** @type {ImageBitmap} */ bitmap) => {
-    if (newest) show(bitmap, newest);
+  const draw = cell.guarded((/** @type {{bitmap: ImageBitmap, image: Picture}} */ { bitmap, image }) => {
+    if (!newest) return;
+    show(bitmap, newest);
+    cell.doors.input.images.show(image, performance.now());
   });
   const fail = cell.guarded((/** @type {Blob} */ blob) => failed?.(blob));
-  const decoder = new Decoder(draw, (error, { blob }) => {
+  const decoder = new Decoder((bitmap, image) => draw({ bitmap, image }), (error, { blob }) => {
     console.info(`widget ${cell.config.widget}: an image could not be decoded:`, error);
     fail(blob);
   });

@@ -275,7 +275,7 @@ export class DemoRobot {
       this.store.values({ n: nowMs, i: [index], v: [value ?? null], a: [ageMs], s: [alarm] }, nowMs);
     } else {
       const bytes = Uint8Array.from(atob(picture), (letter) => letter.charCodeAt(0));
-      this.store.picture({ index, sentMs: nowMs, ageMs, type: type ?? "", bytes }, nowMs);
+      this.store.picture({ index, sentMs: nowMs, ageMs, number: 0, type: type ?? "", bytes }, nowMs);
     }
   }
 

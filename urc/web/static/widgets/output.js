@@ -27,6 +27,7 @@
  * @property {boolean} [moves] Whether it always starts autonomous motion.
  * @property {boolean} [mayMove] Whether it starts motion with some arguments.
  * @property {number} leaseMs Time for which motion outlives the last tick, in milliseconds.
+ * @property {import("../control/shown_images.js").Sight | null} [sees] Image that a held command requires.
  * @property {boolean} isAnswered Whether the robot acknowledges it.
  * @property {string} [title] Title of the command; "" if the driver has none.
  * @property {Record<string, import("../core/types.js").Argument>} [arguments] Arguments that are not fixed.

@@ -1,0 +1,262 @@
+"""Driving by a camera, in a real browser: whoever sees an old image drives slowly, and then stops.
+
+The declared ages are those of `SIGHT`; the robot must stop at most `MARGIN_S` after the second one.
+"""
+
+import asyncio
+import os
+import signal
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Final
+
+import pytest
+from playwright.async_api import Page, expect
+
+from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until
+from tests.e2e.motion.carts import served
+from tests.e2e.motion.driving import (
+    PUSH_S,
+    STOP,
+    Wire,
+    driven,
+    fresh,
+    is_motion,
+    number,
+    push,
+    push_until,
+)
+from tests.e2e.ports import free_port
+from tests.e2e.test_video_page import H264, test_card
+from tests.e2e.transports.programs import program
+from urc.model.driver import Command
+from urc.model.exchange import Hold, Sight
+from urc.model.interface import OutputBinding, WidgetUse
+from urc.model.payload import WriteSpec
+from urc.model.values import Sample, Signal
+from urc.testing.dashboard import FakeRobot, dashboard_profile
+from urc.web.show.demos import colour_bars
+
+pytestmark = pytest.mark.anyio
+
+MARGIN_S: Final = 0.3
+SIGHT: Final = Sight("front", 1.2, 0.4)
+STICK: Final = "[data-cell='1'] .joystick-pad"
+NOTE: Final = "[data-cell='1'] .joystick-note"
+OVERRIDE: Final = "[data-verb='override']"
+CAMERA: Final = WidgetUse("front", "camera", {"image": "front"}, title="Front")
+DRIVE: Final = WidgetUse(
+    "stick", "joystick", {}, {"moved": "drive"}, {"axes": "x", "expo": 0.0, "dead_zone": 0.0},
+    title="Throttle", given={"moved": OutputBinding({"speed": "x"})},
+)  # fmt: skip
+SPARE: Final = WidgetUse("spare", "battery", {"level": "battery"})
+
+
+class Seeing(Wire):
+    """A robot whose one command needs the images of its camera, 20 a second."""
+
+    def __init__(self, *, has_camera: bool = True) -> None:
+        hold = Hold(0.02, {"speed": 0.0}, 0.25, sight=SIGHT)
+        arguments = {"speed": number("speed", -2.0, 2.0)}
+        drive = Command("drive", "wire", WriteSpec("text", {}), arguments, hold=hold)
+        signals = {"front": Signal("front", "image"), "battery": Signal("battery", "integer")}
+        uses = (CAMERA if has_camera else SPARE, DRIVE)
+        profile = dashboard_profile(uses=uses, commands={"drive": drive}, signals=signals)
+        FakeRobot.__init__(self, profile)
+        self.is_filming = True
+        self.seen_s = 0.0
+        """Time of the newest image."""
+
+    async def film(self) -> None:
+        """Publish an image every 50 ms, for as long as the camera films."""
+        images = [colour_bars(64, 48), colour_bars(64, 64)]
+        while True:
+            await asyncio.sleep(0.05)
+            if self.is_filming:
+                images.reverse()
+                self.seen_s = self.clock.now()
+                self.hub.publish([Sample("front", images[0], self.seen_s)])
+
+    def speeds_since(self, count: int) -> list[float]:
+        """Return the speeds of the frames after the first `count`."""
+        texts = [one for one in self.line.texts[count:] if is_motion(one, "drive")]
+        return [float(one.split("speed=")[1]) for one in texts]
+
+
+@asynccontextmanager
+async def filmed(
+    new_page: PageMaker, data: Path | None = None, *, has_camera: bool = True
+) -> AsyncIterator[tuple[Seeing, Page]]:
+    """Serve the robot and its film; give it, and its page when it can be driven."""
+    async with driven(data, Seeing(has_camera=has_camera)) as (robot, address):
+        assert isinstance(robot, Seeing)
+        film = asyncio.create_task(robot.film())
+        try:
+            page = await fresh(new_page)
+            await page.goto(address)
+            await page.wait_for_function(
+                "() => document.querySelector('[data-who]').textContent.match(/driv/)"
+            )
+            if has_camera:
+                await page.wait_for_function(
+                    "() => document.querySelector('.camera canvas').width === 64"
+                )
+            yield robot, page
+        finally:
+            film.cancel()
+            await asyncio.wait((film,))
+
+
+async def stopped_after(robot: Seeing) -> float:
+    """Wait for the stop; return how long after the newest image it was written."""
+    return await robot.until_stopped() - robot.seen_s
+
+
+async def test_a_camera_that_freezes_slows_the_robot_and_stops_it_in_time(
+    new_page: PageMaker,
+) -> None:
+    """The hand holds on: nothing moves again before a new image and a new push."""
+    async with filmed(new_page) as (robot, page):
+        await push_until(robot.is_moving, page, STICK)
+        await asyncio.sleep(0.5)
+        full = robot.speeds_since(0)[-1]
+        count = len(robot.line.texts)
+        robot.is_filming = False
+        late_s = await stopped_after(robot)
+        assert SIGHT.stop_after_s - 0.2 < late_s < SIGHT.stop_after_s + MARGIN_S
+        speeds = robot.speeds_since(count)
+        assert min(speeds) < 0.35 * full, "it was slow when it stopped"
+        assert speeds == sorted(speeds, reverse=True), "it never grew"
+        await expect(page.locator(NOTE)).to_contain_text("image is too old")
+        robot.is_filming = True
+        silent = len(robot.line.texts)
+        await asyncio.sleep(0.6)
+        assert robot.speeds_since(silent) == [], "the hand that held on moves nothing"
+        await page.mouse.up()
+        await push_until(robot.is_moving, page, STICK)
+        await page.mouse.up()
+        await robot.until_stopped()
+
+
+async def test_the_stick_says_that_it_is_slow(new_page: PageMaker) -> None:
+    async with filmed(new_page) as (robot, page):
+        await push_until(robot.is_moving, page, STICK)
+        said = asyncio.create_task(page.wait_for_selector(f"{NOTE} >> text=of the speed"))
+        robot.is_filming = False
+        await said
+        await robot.until_stopped()
+
+
+STUCK: Final = """
+() => {
+  const real = globalThis.createImageBitmap;
+  const never = new Promise(() => {});
+  globalThis.createImageBitmap = (...args) => globalThis.isStuck ? never : real(...args);
+}
+"""
+
+
+async def test_a_decoder_that_stands_still_stops_the_robot(new_page: PageMaker) -> None:
+    """The images arrive, but the page does not show them."""
+    async with filmed(new_page) as (robot, page):
+        await page.evaluate(STUCK)
+        await push_until(robot.is_moving, page, STICK)
+        began_s = robot.clock.now()
+        await page.evaluate("globalThis.isStuck = true")
+        late_s = await robot.until_stopped() - began_s
+        assert late_s < SIGHT.stop_after_s + MARGIN_S
+        assert robot.clock.now() - robot.seen_s < 0.2, "the camera filmed on"
+
+
+async def test_stop_and_release_wait_for_no_image(new_page: PageMaker) -> None:
+    """At the moment of the freeze, before the image is too old."""
+    async with filmed(new_page) as (robot, page):
+        for way in ("release", "stop"):
+            await push_until(robot.is_moving, page, STICK)
+            robot.is_filming = False
+            if way == "release":
+                await page.mouse.up()
+            else:
+                await page.evaluate(
+                    f"document.querySelector(`{STOP}`)"
+                    ".dispatchEvent(new PointerEvent('pointerdown', {bubbles: true, button: 0}))"
+                )
+            assert await stopped_after(robot) < SIGHT.slow_after_s + MARGIN_S  # type: ignore[operator]
+            robot.is_filming = True
+        await page.mouse.up()
+
+
+async def test_a_page_without_the_camera_drives_only_by_an_override(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """For some seconds; who it was stands in the audit log."""
+    async with filmed(new_page, tmp_path, has_camera=False) as (robot, page):
+        await push(page, STICK)
+        await expect(page.locator(NOTE)).to_contain_text("shows no current image")
+        assert robot.speeds_since(0) == []
+        await page.mouse.up()
+        await page.locator(OVERRIDE).click()
+        await expect(page.locator("[data-who]")).to_contain_text("without an image")
+        await push_until(robot.is_moving, page, STICK)
+        await expect(page.locator(NOTE)).to_contain_text("Driving without an image")
+        await robot.until_stopped()
+        await page.mouse.up()
+        await page.goto(page.url.replace("robots/puppet/", "audit"))
+        await expect(page.locator("body")).to_contain_text("may drive without an image for 10 s")
+
+
+PROFILE: Final = """\
+  eye: { type: camera, url: "udp://127.0.0.1:EYE" }
+signals:
+  front: { type: video, stale_after: 2s }
+messages:
+  front: { raw: front, from: eye }
+commands:
+  drive:
+    send: "V {{ speed | round(2) }}"
+    to: wire
+    args: { speed: { min: -1, max: 1, default: 0 } }
+    hold:
+      { repeat: 50ms, release: {}, watchdog: none, sees: front,
+        slow_after: 400ms, stop_after: 800ms }
+widgets:
+  front: { use: camera, bind: { image: front } }
+  stick: { use: joystick, bind: { moved: { command: drive, args: { x: speed } } } }
+interfaces:
+  default: { grid: front stick }
+"""
+
+
+@pytest.mark.needs("ffmpeg")
+async def test_a_video_that_freezes_stops_a_cart_behind_its_guard(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """H.264 over UDP, and the real ways of both: the camera's process, and the guard."""
+    port = free_port()
+    async with (
+        program(*test_card(port, *H264)) as ffmpeg,
+        served(tmp_path, PROFILE.replace("EYE", str(port))) as (cart, address),
+    ):
+        page = await fresh(new_page)
+        await page.goto(address)
+        await page.wait_for_function("() => document.querySelector('.camera canvas')?.width >= 320")
+        await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+        moves = lambda: bool(cart.heard) and cart.heard[-1] not in ("V 0", "V 0.0")  # noqa: E731
+        await push_until(moves, page, ".joystick-pad")
+        await asyncio.sleep(PUSH_S)
+        assert moves(), "a film that goes on stops nothing"
+        os.kill(ffmpeg.pid, signal.SIGSTOP)
+        began_s = asyncio.get_running_loop().time()
+        await until(lambda: not moves())
+        assert asyncio.get_running_loop().time() - began_s < 0.8 + MARGIN_S
+        await expect(page.locator(".joystick-note")).to_contain_text("image is too old")
+        os.kill(ffmpeg.pid, signal.SIGCONT)
+        count = len(cart.heard)
+        await asyncio.sleep(1.0)
+        assert cart.heard[count:] == [], "the hand that held on moves nothing"
+        await page.mouse.up()
+        await push_until(moves, page, ".joystick-pad")
+        await page.mouse.up()
+        await until(lambda: cart.heard[-1] == "V 0")
