@@ -277,6 +277,64 @@ async def test_a_type_without_a_definition_is_sent_as_json(
         assert rover.advertised == [("/strange", "json", "my_msgs/msg/Strange")]
 
 
+HALT = """
+urc: 1
+kind: robot
+name: halter
+title: Halter
+settings: { port: { type: port, required: true } }
+transports:
+  ros: { type: ros, via: foxglove, host: 127.0.0.1, port: "{{ settings.port }}" }
+signals: { is_halted: { type: boolean } }
+messages:
+  halted: { subscribe: { topic: /halted, type: my_msgs/Halt }, json: { is_halted: halt } }
+commands:
+  stay:
+    stop: true
+    send: { publish: { topic: /halt, type: my_msgs/Halt, json: { halt: true } } }
+"""
+
+
+async def test_the_first_stop_of_a_connection_uses_the_definition_of_an_earlier_one(
+    tmp_path: Path,
+) -> None:
+    """Only the robot defines the type, and after its restart it has not announced it yet."""
+    (tmp_path / "halter.yaml").write_text(HALT)
+    rover = FoxgloveRobot(encodings=("cdr",))
+    port, kind = rover.port, "my_msgs/msg/Halt"
+    try:
+        async with (
+            urc.connect(urc.load(tmp_path / "halter.yaml"), port=port) as robot,
+            asyncio.timeout(WAIT_S),
+        ):
+
+            async def halted(text: str, data: bytes) -> None:
+                before = robot.latest("is_halted")
+                while robot.latest("is_halted") == before:
+                    rover.publish("/halted", kind, data, text)
+                    await asyncio.sleep(0.05)
+
+            async def restarted() -> None:
+                nonlocal rover
+                rover.close()
+                await until(lambda: robot.hub.links["ros"].state == "lost")
+                rover = FoxgloveRobot(port, encodings=("cdr",))
+                await until(lambda: robot.hub.links["ros"].is_ready)
+
+            await halted("bool halt", b"\0\1\0\0\0")
+            await restarted()
+            await robot.command("stay")
+            await until(lambda: rover.heard)
+            assert rover.heard == [("/halt", b"\0\1\0\0\1")]
+            await restarted()
+            await halted("uint8 why\nbool halt", b"\0\1\0\0\0\0")
+            await robot.command("stay")
+            await until(lambda: rover.heard)
+            assert rover.heard == [("/halt", b"\0\1\0\0\0\1")]
+    finally:
+        rover.close()
+
+
 async def test_services_answer_and_refuse(rover: FoxgloveRobot, tmp_path: Path) -> None:
     asked: list[bytes] = []
 

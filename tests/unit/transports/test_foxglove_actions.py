@@ -16,7 +16,7 @@ from urc.protocol.ros.topic_codec import TopicCodec
 from urc.transports.base import NOTICE
 from urc.transports.ros.foxglove_actions import HIDDEN
 from urc.transports.ros.foxglove_session import FoxgloveSession
-from urc.transports.ros.goals import LATE, MAX_GOALS, UnfinishedGoals
+from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.topic_queue import TopicReceiveQueue
 
@@ -558,52 +558,3 @@ def test_a_reply_that_is_none_breaks_nothing(data: bytes, encoding: str) -> None
     bridge.session.perform(CANCEL)
     for _, call, _ in bridge.sent():
         bridge.reply(call, data)
-
-
-@pytest.mark.parametrize("is_answered", [False, True])
-def test_a_goal_that_a_late_cancellation_may_have_ended_says_so(is_answered: bool) -> None:
-    bridge = Bridge().offer()
-    bridge.session.perform(CANCEL)
-    ((_, cancel),) = bridge.cancelled()
-    if is_answered:
-        bridge.reply(cancel, code(2))
-    call, _ = bridge.start()
-    bridge.reply(call, YES)
-    bridge.encode()
-    ((_, result, _),) = bridge.sent()
-    bridge.reply(result, b"\0\1\0\0" + struct.pack("<b3xf", 5, 0))
-    (told,) = bridge.told()
-    response = bridge.codec.received(told).envelope
-    assert response is not None
-    assert response.attributes["status"] == 5
-    expected = "the action was cancelled" if is_answered else LATE
-    assert response.attributes["reason"] == expected
-
-
-def test_a_reset_ends_the_cancellation_of_all_goals_but_not_that_of_known_goals() -> None:
-    goals = UnfinishedGoals()
-    bridge = Bridge(goals).offer()
-    call, goal = bridge.start()
-    bridge.reply(call, YES)
-    bridge.session.perform(CANCEL)
-    assert {one for one, _ in bridge.cancelled()} == {ALL, goal}
-    bridge.session.drop_cancellation("/dock")
-    bridge.advance(60)
-    assert {one for one, _ in bridge.cancelled()} == {goal}
-    assert goals.record.dropped == ("/dock",)
-
-
-def test_a_goal_carries_the_robots_time_in_place_of_now(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The engine encodes goals, and the transport knows the time: it writes it into the bytes."""
-    text = "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time[] times"
-    monkeypatch.setitem(TEXTS, "send_goal", (text, "bool accepted"))
-    bridge = Bridge().offer()
-    robot_s = 4_000
-    bridge.session.arrived(struct.pack("<BQ", 2, robot_s * 10**9))
-    bridge.session.perform(DOCK._replace(body={"times": ["now", {"sec": 5, "nanosec": 6}, "now"]}))
-    bridge.encode()
-    ((_, _, data),) = bridge.sent()
-    count, first, _, second, third, last, _ = struct.unpack("<IIIIIII", data[20:])
-    assert (count, second, third) == (3, 5, 6)
-    assert first == last
-    assert robot_s <= first <= robot_s + 60

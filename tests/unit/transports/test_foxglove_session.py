@@ -114,3 +114,26 @@ def test_only_frames_of_the_bridge_are_arrivals() -> None:
     delivered = [asyncio.run(queue.pop()).verb for _ in range(5)]
     assert delivered == ["message", "response", "response", TOPICS, NOTICE]
     assert queue.arrivals == 3
+
+
+OWN = {"id": 9, "topic": "/odom", "encoding": "cdr", "schemaName": "my_msgs/msg/Own"}
+
+
+def published(session: FoxgloveSession) -> list[tuple[str, bool]]:
+    """Send a message with the definition of an earlier connection; return its form."""
+    said = {"topic": "/go", "type": "my_msgs/Own", "encoding": "cdr", "data": b"\0\1\0\0\5"}
+    envelope = Envelope("publish", {**said, "stamps": [], "definition": "int8 x"}, {"x": 5})
+    session.perform(envelope)
+    told = [frame for frame, is_text in session.written() if not is_text]
+    return [(frame[5:].decode("latin1"), frame.endswith(b"\5")) for frame in told]
+
+
+def test_an_earlier_definition_counts_only_until_the_robot_announces_another_one() -> None:
+    """Bytes of another version of the type could mean anything."""
+    binary, text = [("\0\1\0\0\5", True)], [('{"x":5}', False)]
+    session = greeted()
+    assert published(session) == binary
+    hear(session, {"op": "advertise", "channels": [{**OWN, "schema": "int8 x"}]})
+    assert published(session) == binary
+    hear(session, {"op": "advertise", "channels": [{**OWN, "schema": "int8 y\nint8 x"}]})
+    assert published(session) == text

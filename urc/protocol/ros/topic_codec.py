@@ -120,7 +120,7 @@ class _Source:
 
 
 class TopicCodec:
-    """The codec of one connection; its definitions are discarded when the connection is opened."""
+    """The codec of one connection; its readers are discarded when the connection is opened."""
 
     def __init__(
         self,
@@ -145,6 +145,11 @@ class TopicCodec:
         self._compiled: dict[tuple[object, ...], _AnySource | _AnyWriter] = {}
         self._known: dict[str, Definitions] = {}
         """Definitions from the robot, keyed by the type's short name."""
+        self._texts: dict[str, str] = {}
+        """Text of each definition in `_known`."""
+        self._earlier: dict[str, tuple[Definitions, str]] = {}
+        """Newest definitions of earlier connections and their texts, oldest first. They outlive a
+        connection for the same reason as `_schema_writers`, until the type is defined again."""
         self._writers: dict[tuple[str, bool], Writer | None] = {}
         self._schemas: dict[str, ProtoTypes] = {}
         """Parsed schemas of Protocol Buffers, keyed by their text."""
@@ -172,7 +177,13 @@ class TopicCodec:
         self._prepared = 0
         self._services.clear()
         self._compiled.clear()
+        for name, found in self._known.items():
+            self._earlier.pop(name, None)
+            self._earlier[name] = found, self._texts[name]
+        while len(self._earlier) > MAX_COMPILED:
+            del self._earlier[next(iter(self._earlier))]
         self._known.clear()
+        self._texts.clear()
         self._writers.clear()
         self._schemas.clear()
         self._nested.clear()
@@ -297,8 +308,9 @@ class TopicCodec:
         )
         if parse is None:
             raise BadDefinition(f"the definition notation {schema.notation!r} is not supported")
-        found = parse(schema.type, schema.text)
-        self._known[plain_name(schema.type)] = found
+        found, short = parse(schema.type, schema.text), plain_name(schema.type)
+        self._known[short], self._texts[short] = found, schema.text
+        self._earlier.pop(short, None)
         self._writers.pop((plain_name(schema.type), schema.encoding == "ros1"), None)
         return layout_of(schema.type, found, is_ros1=schema.encoding == "ros1")
 
@@ -411,6 +423,8 @@ class TopicCodec:
             "data": written.data,
             "stamps": list(written.stamps),
         }
+        if (earlier := self._earlier.get(plain_name(kind))) is not None:
+            added["definition"] = earlier[1]
         if self._has_hashes:
             added["hash"] = known_hash(str(payload.attributes.get("type")))
         return payload._replace(attributes={**payload.attributes, **added})
@@ -430,7 +444,8 @@ class TopicCodec:
         if key not in self._writers:
             is_known = self._has_hashes and not self._is_ros1
             common = known_types() if is_known else common_types(is_ros1=self._is_ros1)
-            definitions = self._known.get(name, common)
+            earlier, _ = self._earlier.get(name, (common, ""))
+            definitions = self._known.get(name, earlier)
             try:
                 layout = layout_of(name, definitions, is_ros1=self._is_ros1)
                 self._writers[key] = Writer(layout, is_ros1=self._is_ros1)

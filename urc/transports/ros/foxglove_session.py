@@ -465,7 +465,8 @@ class FoxgloveSession:
             raise TransportError(
                 "the bridge accepts no messages: it lacks the capability clientPublish"
             )
-        encoding, data, schema = message_data(envelope, self.encodings, self._time)
+        channels = self._channels.values()
+        encoding, data, schema = message_data(envelope, self.encodings, self._time, channels)
         number = self._own.get((topic, encoding))
         if number is None:
             kind = spelled(kind, "msg", 1 if encoding == "ros1" else 2)

@@ -146,3 +146,45 @@ def test_wanted_parts_contain_their_longer_paths() -> None:
     assert wanted_of([("a", "b"), ("a",), ("c", "*", "d")]) == {"a": True, "c": {"*": {"d": True}}}
     assert wanted_of([("a",), ("a", "b")]) == {"a": True}
     assert wanted_of([("a",), ()]) is ALL
+
+
+OWN = Envelope("publish", {"topic": "/go", "type": "pkg/T"}, {"x": 5})
+
+
+def sent(codec: TopicCodec) -> tuple[object, object]:
+    """Return the bytes of a message, and the definition from an earlier connection."""
+    envelope = codec.sent(OWN)
+    assert isinstance(envelope, Envelope)
+    return envelope.attributes.get("data"), envelope.attributes.get("definition")
+
+
+def test_a_type_of_the_robot_is_written_on_the_next_connection_before_it_is_defined_again() -> None:
+    """A stop is sent first there; the transport compares the definition with the robot's."""
+    codec = TopicCodec()
+    assert sent(codec) == (None, None)
+    codec.received(definition("/a", "int8 x"))
+    for _ in range(3):
+        assert sent(codec) == (b"\0\1\0\0\5", None)
+        codec.reset()
+        assert sent(codec) == (b"\0\1\0\0\5", "int8 x")
+        codec.reset()
+        codec.received(definition("/a", "int8 x"))
+    codec.reset()
+    codec.received(definition("/a", "int8 y\nint8 x"))
+    assert sent(codec) == (b"\0\1\0\0\0\5", None), "the robot has another version now"
+
+
+def test_kept_definitions_are_bounded() -> None:
+    codec = TopicCodec()
+    for connection in range(4):
+        for number in range(MAX_COMPILED // 2):
+            said = {"topic": "/a", "encoding": "cdr", "notation": "ros2msg"}
+            kind = f"pkg{connection}/msg/T{number}"
+            codec.received(Envelope("definition", {**said, "type": kind}, "int8 x"))
+        codec.reset()
+    kinds = [(connection, 0) for connection in range(4)]
+    known = [
+        codec.sent(OWN._replace(attributes={"topic": "/go", "type": f"pkg{first}/T{second}"}))
+        for first, second in kinds
+    ]
+    assert ["data" in one.attributes for one in known] == [False, False, True, True]  # type: ignore[union-attr] # all are envelopes
