@@ -577,11 +577,8 @@ class Conversation(Connection):
         if pending.expectation.answer.is_silence:
             return self._silent(pending, now)
         exchange, reply_s = pending.exchange, pending.expectation.answer.timeout_s
-        text = f"no answer to {exchange.ask.label} {pending.waited(now)}"
-        came = self.receiver.came_since(exchange.sent_at, f"no answer to {exchange.ask.label}")
-        text += came
-        if came and exchange.ask.match is None and len(self._pending_replies) > 1:
-            text += "; if replies arrive in a different order from requests, declare 'match'"
+        is_alone = len(self._pending_replies) == 1
+        text = self.receiver.no_answer(exchange, pending.waited(now), is_alone=is_alone)
         events: list[LineEvent] = [Violation(self.spec.name, "reply-timeout", text)]
         pending.is_late = True
         pending.due = now + reply_s

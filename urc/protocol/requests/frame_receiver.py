@@ -16,7 +16,7 @@ from urc.protocol.events import Noted, Samples, Send, Violation
 from urc.protocol.forms.http_head import is_redirect
 from urc.protocol.framing.base import Decoder, Framing, StreamDecoder
 from urc.protocol.framing.receive_buffer import ReceiveBuffer
-from urc.protocol.requests.exchange import LineEvent
+from urc.protocol.requests.exchange import Exchange, LineEvent
 from urc.protocol.requests.message_effects import Acknowledgements, Collector
 from urc.protocol.requests.messages import Messages
 from urc.protocol.requests.reply_match import (
@@ -144,6 +144,21 @@ class FrameReceiver:
             return ""
         shown = text.removeprefix(_NO_MATCH)
         return f"; received {shown}, which is {instead}" if shown != text else f"; {text}"
+
+    def no_answer(self, exchange: Exchange, waited: str, *, is_alone: bool) -> str:
+        """Return why a request counts as unanswered.
+
+        Args:
+            exchange: the request.
+            waited: the time waited in vain, such as ``within 2 s``.
+            is_alone: whether no other request waits for a reply.
+        """
+        text = f"no answer to {exchange.ask.label}"
+        came = self.came_since(exchange.sent_at, text)
+        text = f"{text} {waited}{came}"
+        if came and exchange.ask.match is None and not is_alone:
+            text += "; if replies arrive in a different order from requests, declare 'match'"
+        return text
 
     def listen(self, expectation: Expectation) -> None:
         """Add an expectation for frames other than replies."""
