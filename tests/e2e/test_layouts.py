@@ -1,12 +1,14 @@
 """Interfaces in a real browser: by screen, by hand, in tabs, over a picture, and one for faults."""
 
 import asyncio
+import io
 import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from playwright.async_api import FloatRect, Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
@@ -20,6 +22,7 @@ from tests.e2e.dashboards import (
     until_text,
 )
 from tests.e2e.dev_pages import served
+from tests.e2e.drawn import RED, plain, until_pixel
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
     LEFT,
@@ -368,6 +371,32 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
             seen = await box(page, value)
             assert back["y"] + back["height"] / 2 < seen["y"]
             assert seen["y"] + seen["height"] < back["y"] + back["height"]
+
+
+async def test_a_blurred_copy_surrounds_a_picture_that_does_not_fill_the_page(
+    new_page: PageMaker,
+) -> None:
+    """Dimmed, so that nobody takes it for a part of the picture; only where there is room."""
+    signals = {"front": Signal("front", "image")}
+    uses = [USES[0], WidgetUse("front", "camera", {"image": "front"})]
+    profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))
+    interface = Interface("d", "Drive", {"landscape": row("left")}, background="front")
+    robot = FakeRobot(profile._replace(interfaces={"d": interface}))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("front", plain(RED))
+        await turned(page, PHONE_LYING)
+        await until_pixel(page, ".camera-surround", 0.1, 0.5, "r > 190 && g < 10 && b < 10")
+        x, y = 0.01, 0.5
+        shot = Image.open(io.BytesIO(await page.locator(".camera-face").screenshot()))
+        red, green, blue = shot.convert("RGB").getpixel((int(x * shot.width), int(y * shot.height)))
+        assert 40 < red < 120
+        assert green < 40
+        assert blue < 40
+        await turned(page, (800, 660))
+        await expect(page.locator(".camera-surround")).to_be_hidden()
 
 
 async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:

@@ -9,6 +9,7 @@ import { DASH, attribute, button, faultOf, many, noteOf, part, write } from "urc
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 import { Screen } from "./screen.js";
+import { Surround } from "./surround.js";
 
 /** Whether the screen has room for signs only, such as a phone in landscape. */
 const isLow = () => matchMedia("(height < 30rem)").matches;
@@ -50,6 +51,8 @@ class Camera {
     this.canvas = canvas;
     this.cross = el.querySelector(".camera-cross");
     this.screen = new Screen(canvas);
+    const around = el.querySelector(".camera-surround");
+    this.surround = around instanceof HTMLCanvasElement ? new Surround(around) : null;
     this.look = {
       fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
       rotate: Number(options["rotate"] ?? 0),
@@ -73,6 +76,7 @@ class Camera {
         this.rate?.add(performance.now() / 1000);
         if (this.screen.show(bitmap)) this.draw();
         ctx.shown(picture);
+        this.surround?.follow(this.canvas, this.look);
         if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },
@@ -211,8 +215,11 @@ class Camera {
   fit() {
     const { fit } = this.look;
     if (fit !== "auto") return fit;
-    const isGround = this.root.closest('[data-place="ground"]') !== null;
-    return isGround && !this.isWhole ? "ground" : "contain";
+    return this.isGround() && !this.isWhole ? "ground" : "contain";
+  }
+
+  isGround() {
+    return this.root.closest('[data-place="ground"]') !== null;
   }
 
   /** Place the image in its box. The browser scales the image, so that no frame must be redrawn. */
@@ -225,6 +232,10 @@ class Camera {
     style.width = `${width}px`;
     style.height = `${height}px`;
     style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
+    const isLying = angle % Math.PI !== 0;
+    const [wide, high] = isLying ? [height, width] : [width, height];
+    this.surround?.need(this.isGround() && (wide < size.width - 1 || high < size.height - 1));
+    this.surround?.follow(this.canvas, this.look);
     // The crosshair marks the middle of the image.
     if (this.cross instanceof SVGElement) this.cross.style.transform = `translateY(${y - size.height / 2}px)`;
   }
