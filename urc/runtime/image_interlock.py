@@ -13,8 +13,8 @@ from urc.motion.lease import LeaseState
 
 __all__ = ["LONGEST_OVERRIDE_S", "NO_IMAGE", "OLD_IMAGE", "ImageInterlock", "why_blind"]
 
-NO_IMAGE: Final = "This page shows no current image of the camera"
-OLD_IMAGE: Final = "The image is too old: let go, wait for a new one, then start again"
+NO_IMAGE: Final = "No current image of the camera"
+OLD_IMAGE: Final = "Image too old: let go, then start again"
 _NEEDS_NONE: Final = "no command of this robot requires an image"
 SHORTEST_OVERRIDE_S: Final = 1.0
 LONGEST_OVERRIDE_S: Final = 30.0

@@ -129,7 +129,7 @@ async def test_a_camera_that_freezes_slows_the_robot_and_stops_it_in_time(
         speeds = robot.speeds_since(count)
         assert min(speeds) < 0.35 * full, "it was slow when it stopped"
         assert speeds == sorted(speeds, reverse=True), "it never grew"
-        await expect(page.locator(NOTE)).to_contain_text("image is too old")
+        await expect(page.locator(NOTE)).to_contain_text("Image too old")
         robot.is_filming = True
         silent = len(robot.line.texts)
         await asyncio.sleep(0.6)
@@ -194,11 +194,11 @@ async def test_a_page_without_the_camera_drives_only_by_an_override(
     """For some seconds; who it was stands in the audit log."""
     async with filmed(new_page, tmp_path, has_camera=False) as (robot, page):
         await push(page, STICK)
-        await expect(page.locator(NOTE)).to_contain_text("shows no current image")
+        await expect(page.locator(NOTE)).to_contain_text("No current image")
         assert robot.speeds_since(0) == []
         await page.mouse.up()
         await page.locator(OVERRIDE).click()
-        await expect(page.locator("[data-who]")).to_contain_text("without an image")
+        await expect(page.locator("[data-who]")).to_contain_text("Blind: ")
         await push_until(robot.is_moving, page, STICK)
         await expect(page.locator(NOTE)).to_contain_text("Driving without an image")
         await robot.until_stopped()
@@ -251,7 +251,7 @@ async def test_a_video_that_freezes_stops_a_cart_behind_its_guard(
         began_s = asyncio.get_running_loop().time()
         await until(lambda: not moves())
         assert asyncio.get_running_loop().time() - began_s < 0.8 + MARGIN_S
-        await expect(page.locator(".joystick-note")).to_contain_text("image is too old")
+        await expect(page.locator(".joystick-note")).to_contain_text("Image too old")
         os.kill(ffmpeg.pid, signal.SIGCONT)
         count = len(cart.heard)
         await asyncio.sleep(1.0)

@@ -107,6 +107,7 @@ export class Controls {
     const may = lease?.drives ?? false;
     const isAsked = isMine && lease?.asker !== null;
     const iAsk = lease !== null && lease.asker?.id === lease.you;
+    const isBlind = isMine && !isAsked && drive.overrideMs <= nowMs && this.input.isBlind(nowMs);
     /** @type {Record<Verb, boolean>} */
     const shown = {
       reset: isLatched && may,
@@ -115,8 +116,9 @@ export class Controls {
       force: isOthers && may && lease.forces,
       yes: isAsked,
       no: isAsked,
-      override: isMine && !isAsked && drive.overrideMs <= nowMs && this.input.isBlind(nowMs),
-      leave: isMine && !isAsked,
+      override: isBlind,
+      // A second button would move STOP on small screens.
+      leave: isMine && !isAsked && !isBlind,
     };
     const left = this.buttons.find(([verb, button]) => !shown[verb] && button.matches(BEFORE_DRIVING.has(verb) ? ":focus" : ":focus-visible"))?.[0];
     for (const [verb, button] of this.buttons) {
@@ -155,7 +157,7 @@ export class Controls {
     if (!lease) return this.drive.socket.refusal ? t("Not connected to the robot") : t("Not connected to URC");
     const [asker, holder] = [said(lease.asker?.name ?? ""), said(lease.holder?.name ?? "")];
     if (isAsked) return t("◆ {who} asks to drive: {seconds} s", { who: asker, seconds: leftS });
-    if (isMine && blindS > 0) return t("▲ You drive without an image: {seconds} s", { seconds: Math.ceil(blindS) });
+    if (isMine && blindS > 0) return t("▲ Blind: {seconds} s", { seconds: Math.ceil(blindS) });
     if (isMine) return t("● You drive");
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });

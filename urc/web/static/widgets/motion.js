@@ -153,8 +153,9 @@ export class Motion {
     if (phase === "asking") note = t("… taking control");
     else if (phase !== "idle" && reason) note = `◆ ${reason}`;
     if (!note && this.notice) note = `◆ ${this.notice}`;
-    // The notice replaces the values, which would look as if the robot moved.
-    attribute(this.root, "data-notice", this.notice ? "yes" : null);
+    // The notice replaces the values, which would look as if the robot moved, or moved as fast.
+    const isNoted = this.notice || (phase === "held" && reason);
+    attribute(this.root, "data-notice", isNoted ? "yes" : null);
     write(this.note, note);
     const sent = phase === "held" ? /** @type {Push | null} */ (values) : null;
     // A stopped or refused gesture moves nothing, so the control is drawn at rest under the finger.
