@@ -37,7 +37,7 @@ def pairs() -> list[tuple[str, str]]:
     """Return pairs of visitor and call: each call once, or with each visitor in a thorough run."""
     if IS_THOROUGH:
         return list(product(VISITORS, OPERATIONS))
-    (first,) = sampled(range(len(VISITORS)), 1)
+    first = sampled(range(len(VISITORS)), 1)[0]
     following = islice(cycle(VISITORS), first, None)
     return list(zip(following, OPERATIONS, strict=False))
 
