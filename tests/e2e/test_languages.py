@@ -130,9 +130,10 @@ async def test_a_robot_is_driven_in_another_language(new_page: PageMaker, tag: s
         await expect(page.locator("[data-who]")).to_have_text(words["● You drive"])
         await check(page, tag)
         assert await stop_box(page) == before
+        await expect(page.locator("[data-stop-button]")).to_have_text("STOP")
         await page.locator("[data-stop-button]").click()
         await expect(page.locator("[data-stop-note]")).to_contain_text(words["✓ latched"])
-        await expect(page.locator("[data-stop-button]")).to_have_text("STOP")
+        await expect(page.locator("[data-stop-button]")).to_have_text(words["STOPPED"])
         await check(page, tag)
         assert await stop_box(page) == before
         await page.goto(f"{address}robots/still/")
