@@ -245,7 +245,10 @@ async def test_a_video_that_freezes_stops_a_cart_behind_its_guard(
         await page.goto(address)
         await page.wait_for_function("() => document.querySelector('.camera canvas')?.width >= 320")
         await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
-        moves = lambda: bool(cart.heard) and cart.heard[-1] not in ("V 0", "V 0.0")  # noqa: E731
+
+        def moves() -> bool:
+            return bool(cart.heard) and cart.heard[-1] not in ("V 0", "V 0.0")
+
         await push_until(moves, page, ".joystick-pad")
         await asyncio.sleep(PUSH_S)
         assert moves(), "a film that goes on stops nothing"
