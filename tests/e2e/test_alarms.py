@@ -27,6 +27,15 @@ MODE = Signal(
     limits=AlarmLimits(states=("stuck",), attributes=(("stuck", AlarmAttributes("medium")),)),
 )  # fmt: skip
 COUNT = 200
+NARROW = """(cell) => {
+  Object.assign(cell.style, { width: "104px", height: "58px", minHeight: "0", alignSelf: "start" });
+}"""
+LINES = """(el) => {
+  const range = new Range();
+  range.selectNodeContents(el);
+  return new Set([...range.getClientRects()].map(({ top }) => Math.round(top))).size;
+}"""
+IS_WHOLE = "(el) => el.scrollWidth <= el.clientWidth && el.scrollHeight <= el.clientHeight"
 WATCH = """() => {
   window.seen = { tones: 0, said: [], longest: 0, flips: 0, shifted: [] };
   const real = OscillatorNode.prototype.start;
@@ -112,6 +121,21 @@ async def test_a_strip_shows_the_worst_alarm_and_is_gone_with_it(new_page: PageM
         assert await page.title() == title
         await page.click("[data-key=close]")
         assert await page.locator("[data-alarm-sheet]").is_hidden()
+
+
+async def test_a_small_value_shows_its_name_and_its_alarm_whole(new_page: PageMaker) -> None:
+    """In a cell as narrow as on a phone, the name stays one word on one line."""
+    use = WidgetUse("level", "battery", {"level": "battery"})
+    robot = FakeRobot(dashboard_profile(uses=[use], signals={"battery": BATTERY}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("battery", 15, alarm="low")
+        await page.locator("[data-cell='0'] .battery-note", has_text="Low").wait_for()
+        await page.locator("[data-cell='0']").evaluate(NARROW)
+        assert await page.locator(".battery-title").evaluate(LINES) == 1
+        assert await page.locator(".battery-note").evaluate(IS_WHOLE)
 
 
 async def test_an_acknowledgement_holds_on_every_screen(new_page: PageMaker) -> None:
