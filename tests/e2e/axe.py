@@ -13,8 +13,9 @@ CONTRAST = "color-contrast"
 
 _RUN = """
 async (rules) => {
-  // A colour between two themes is none of either.
-  const fades = document.getAnimations().filter((one) => one instanceof CSSTransition);
+  // A colour between two themes is none of either, and a card that appears is not yet opaque.
+  const fades = document.getAnimations().filter((one) =>
+    one.playState === "running" && Number.isFinite(one.effect.getComputedTiming().endTime));
   await Promise.allSettled(fades.map((one) => one.finished));
   const found = await axe.run(document, {
     runOnly: rules.length > 0
