@@ -29,6 +29,16 @@ FREE = """() => {
     Math.max(stop.left - reset.right, reset.left - stop.right, 0),
     Math.max(stop.top - reset.bottom, reset.top - stop.bottom, 0));
 }"""
+COVERED = """(cell) => [...cell.querySelectorAll("button, [role='slider']")]
+  .filter((one) => one.checkVisibility({ visibilityProperty: true, opacityProperty: true }))
+  .flatMap((one) => {
+    const { left, top, width, height } = one.getBoundingClientRect();
+    return [0.1, 0.5, 0.9].flatMap((across) => [0.1, 0.5, 0.9].map((down) =>
+      document.elementFromPoint(left + across * width, top + down * height)))
+      .filter((found) => !cell.contains(found))
+      .map((found) => `${one.textContent.trim()} lies under ${found?.className}`);
+  })"""
+"""What covers the controls of an open question."""
 LEAST_RESET_PX = 150
 """Distance of Reset from STOP, so that a finger that stops a robot never resets it."""
 
@@ -76,3 +86,22 @@ async def test_all_cells_and_sticks_are_on_the_screen_and_stop_stands_free(
             if free < LEAST_RESET_PX:
                 wrong[f"stopped, {size[0]} x {size[1]}"] = [f"Reset is {free:.0f} px from STOP"]
     assert not wrong, json.dumps(wrong, indent=1, ensure_ascii=False)
+
+
+async def test_an_open_question_lies_above_all_other_widgets(
+    new_page: PageMaker, urc_process: Callable[..., UrcProcess], tmp_path: Path
+) -> None:
+    """A finger that slides to confirm touches nothing else, not even next to a stick."""
+    process = urc_process("demo", "--no-browser", "--port", "0", XDG_DATA_HOME=str(tmp_path))
+    address = (await process.wait_for_async(r"dashboard (http://\S+)", 60.0))[1]
+    page = await new_page()
+    await enter(page.context, address)
+    await page.set_viewport_size({"width": 390, "height": 844})
+    await opened(page, address, "tello")
+    for name in ("Takeoff", "Cut motors"):
+        await page.get_by_role("button", name=name).first.click()
+        question = page.locator(".urc-asking")
+        await expect(question).to_have_count(1)
+        assert await question.evaluate(COVERED) == [], name
+        await page.keyboard.press("Escape")
+        await expect(question).to_have_count(0)
