@@ -216,6 +216,8 @@ async def test_a_button_leads_to_the_widgets_that_a_small_screen_lacks(
         await turned(page, PHONE_LYING)
         await expect(page.locator(UP)).to_be_hidden()
         await expect(more).to_have_attribute("aria-pressed", "false")
+        await expect(more).to_have_attribute("title", "2 more widgets")
+        await expect(more).to_have_attribute("aria-label", "2 more widgets")
         await push(page)
         await robot.until_moving()
         await more.focus()

@@ -333,7 +333,7 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
     shows = (
-        "display:inline-flex;--urc-rest:attr(data-rest-one)"
+        "display:inline-flex;--urc-rest-count:1;--urc-rest:attr(data-rest-one)"
         ';--urc-rest-first:"a";--urc-rest-others:""'
     )
     assert f"[data-rest]{{{shows}}}" in text
@@ -347,7 +347,7 @@ def test_the_button_names_the_first_missing_widget_and_counts_the_others() -> No
     screens = Interface("i", layouts={"landscape": wide, "phone_landscape": low})
     titles = {"a": '"}</style>\\', "c": "Brake"}
     text = grid_css(screens, ("a", "b", "c"), titles=titles)
-    assert '--urc-rest:"2 " attr(data-rest-many);' in text
+    assert '--urc-rest:attr(data-rest-before) "2" attr(data-rest-after);' in text
     assert r'--urc-rest-first:"\22 }\3c /style\3e \5c ";' in text
     assert '--urc-rest-others:", " attr(data-rest-one)}' in text
 

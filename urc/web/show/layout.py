@@ -169,7 +169,8 @@ def _button(
         shown = "display:none"
         if missing:
             first, others = missing[0].name, len(missing) - 1
-            shown = f"display:inline-flex;--urc-rest:{_more(len(missing))}"
+            shown = f"display:inline-flex;--urc-rest-count:{len(missing)}"
+            shown += f";--urc-rest:{_more(len(missing))}"
             shown += f";--urc-rest-first:{_css_string(titles.get(first, first))}"
             shown += f";--urc-rest-others:{_more(others, ', ') or _css_string('')}"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
@@ -177,10 +178,13 @@ def _button(
 
 
 def _more(count: int, before: str = "") -> str:
-    """Return CSS for “3 more widgets” in the language of the page; "" for 0."""
+    """Return CSS for “3 more” in the language of the page; "" for 0."""
     if count == 1:
         return f'"{before}" attr(data-rest-one)' if before else "attr(data-rest-one)"
-    return f'"{before}{count} " attr(data-rest-many)' if count else ""
+    if not count:
+        return ""
+    number = f'attr(data-rest-before) "{count}" attr(data-rest-after)'
+    return f'"{before}" {number}' if before else number
 
 
 def _css_string(text: str) -> str:

@@ -20,7 +20,10 @@ export function watchRest(root, stage, leave, signal) {
   const grid = stage.querySelector(".urc-grid");
   if (!(grid instanceof HTMLElement)) return; // the debug interface
   const isRest = () => (grid.dataset["page"] ?? "").endsWith(REST);
-  const show = () => button.setAttribute("aria-pressed", String(isRest()));
+  const show = () => {
+    button.setAttribute("aria-pressed", String(isRest()));
+    name(button);
+  };
   button.addEventListener(
     "click",
     () => {
@@ -33,5 +36,20 @@ export function watchRest(root, stage, leave, signal) {
   const changes = new MutationObserver(show); // a tab changes the page, too
   changes.observe(grid, { attributeFilter: ["data-page"] });
   signal.addEventListener("abort", () => changes.disconnect());
+  addEventListener("resize", show, { signal }); // another screen may lack other widgets
   show();
+}
+
+/**
+ * Name the button by the whole phrase, such as “4 more widgets”; in the bar, it is shorter.
+ *
+ * @param {HTMLElement} button
+ */
+function name(button) {
+  const count = Number(getComputedStyle(button).getPropertyValue("--urc-rest-count"));
+  if (!count) return; // this screen has all widgets
+  const { restTitleOne = "", restTitleMany = "" } = button.dataset;
+  const title = count === 1 ? restTitleOne : `${count} ${restTitleMany}`;
+  button.title = title;
+  button.setAttribute("aria-label", title);
 }
