@@ -38,6 +38,14 @@ CUT_VALUES = """() => [...document.querySelectorAll(".plot-value")]
   .filter((one) => one.scrollWidth > one.clientWidth
     || one.getBoundingClientRect().right > one.closest("li").getBoundingClientRect().right + 1)
   .map((one) => one.textContent)"""
+READOUT = """() => {
+  const box = (part) => document.querySelector(part).getBoundingClientRect();
+  return {
+    drawing: getComputedStyle(document.querySelector(".scan-face")).visibility,
+    isBelow: box(".scan-line").top >= box(".scan-title").bottom - 1,
+    isOpen: document.querySelector(".urc-pip > .urc-swap").checkVisibility(),
+  };
+}"""
 ENTRIES = """() => {
   const frame = document.querySelector(".plot-legend").getBoundingClientRect();
   return [...document.querySelectorAll(".plot-entry")].filter((one) => {
@@ -129,3 +137,28 @@ async def test_a_small_plot_shows_the_values_that_fit_and_the_number_of_the_othe
     assert shown >= 1
     assert rest == f"{len(names) - shown} more"
     assert cut == []
+
+
+async def test_a_view_too_low_for_a_drawing_is_a_name_with_a_value(new_page: PageMaker) -> None:
+    """The value covers no drawing; the button that enlarges the view stays."""
+    signals = {
+        "eye": Signal("eye", "image", stale_after_s=1.0),
+        "laser": Signal("laser", "scan", stale_after_s=1.0),
+    }
+    uses = [
+        WidgetUse("eye", "camera", {"image": "eye"}),
+        WidgetUse("laser", "scan", {"scan": "laser"}),
+    ]
+    profile = dashboard_profile(signals=signals, uses=uses)
+    grid = Layout(2, 2, (Slot("eye", 1, 1), Slot("laser", 0, 1)))
+    interface = Interface("x", "X", {"landscape": grid}, background="eye")
+    robot = FakeRobot(profile._replace(interfaces={"x": interface}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.set_viewport_size({"width": 844, "height": 390})
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        for height, drawing in ((108, "visible"), (58, "hidden")):
+            await page.eval_on_selector(".urc-pip", SIZE, [144, height])
+            found = await page.evaluate(READOUT)
+            assert found == {"drawing": drawing, "isBelow": True, "isOpen": True}
