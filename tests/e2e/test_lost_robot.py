@@ -63,6 +63,7 @@ def seeing_robot(*others: WidgetUse) -> FakeRobot:
     signals = {
         "eye": Signal("eye", "image", stale_after_s=1.0),
         "battery": Signal("battery", "integer", unit="%", stale_after_s=1.0),
+        "laser": Signal("laser", "scan", stale_after_s=1.0),
     }
     uses = (
         WidgetUse("eye", "camera", {"image": "eye"}),
@@ -148,6 +149,38 @@ async def test_controls_are_out_of_sight_until_the_robot_is_back(
         await page.locator("[data-lost-again]").focus()
         robot.link("live")
         await expect(control).to_have_css("opacity", "1")
+
+
+GAPS = """() => {
+  const box = (selector) => document.querySelector(selector).getBoundingClientRect();
+  const [card, view] = [box(".urc-lost-card"), box(".urc-cell:has(> .scan)")];
+  return [card.top - box("[data-place='ground']").bottom, view.top - card.bottom,
+    box(".urc-who").top - view.bottom];
+}"""
+"""Pixels between picture, card, view and the row above STOP."""
+
+
+async def test_on_a_phone_the_card_is_between_the_picture_and_the_views(
+    new_page: PageMaker,
+) -> None:
+    """It takes the place of the controls, without an empty band; the views say their age."""
+    names = ("lift", "raise", "hoist", "heave")
+    lifts = [WidgetUse(one, "hold-button", {}, {"held": "lift"}) for one in names]
+    robot = seeing_robot(*lifts, WidgetUse("laser", "scan", {"scan": "laser"}))
+    rows = [Slot(one, 1 + row, 0) for row, one in enumerate(names)]
+    slots = (Slot("battery", 0, 0), *rows, Slot("laser", 5, 0))
+    grids = {"phone_portrait": Layout(6, 2, slots)}
+    interface = Interface("default", "Default", grids, background="eye")
+    robot = FakeRobot(robot.profile._replace(interfaces={"default": interface}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.link("lost", REFUSED)
+        await expect(page.locator(CARD)).to_be_visible()
+        await expect(page.locator(".urc-cell:has(> .scan)")).to_have_css("opacity", "1")
+        await page.wait_for_function(f"() => ({GAPS})().every((gap) => gap >= 0 && gap <= 24)")
+        await page.wait_for_function(f"() => ({COVERED})().length === 0")
 
 
 COVERED = """() => {

@@ -18,6 +18,13 @@ const SHORT_MS = 700;
 /** Time for which "Try now" stays disabled. */
 const TRYING_MS = 1500;
 
+/** Distance between the card and what stays in sight, in pixels. */
+const GAP_PX = 8;
+/** Cells in front of the background that only show something large. */
+const VIEWS = '.urc-grid > .urc-cell[data-footprint="view"]:not([data-place="ground"])';
+/** Cells that the card never covers: values, STOP, and a control in use. */
+const KEPT = `.urc-grid > .urc-cell:not([data-footprint="stick"], [data-footprint="lever"], [data-footprint="button"], [data-footprint="view"]), .urc-grid > .urc-cell:is(.urc-asking, :focus-within, :has(> .stop)):not([data-footprint="view"])`;
+
 export class LostCard {
   /**
    * @param {HTMLElement} el the card
@@ -34,6 +41,8 @@ export class LostCard {
     this.again = part(el, "[data-lost-again]");
     this.age = part(el, "[data-lost-age]");
     this.shown = "";
+    /** Height of what stays in sight between the card and STOP's row. */
+    this.footPx = 0;
     /** Transports that only commands open. @type {string[]} */
     this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
     /** Whether any connection has been good since the page was opened. */
@@ -85,20 +94,54 @@ export class LostCard {
   }
 
   /**
-   * Put the card at the top of the page if it covers fewer old values there than above STOP. Views
+   * Put the card in the place of the controls on a phone in portrait. Elsewhere, put it at the top of the page if it covers fewer old values there than above STOP. Views
    * do not count, because the background at the top is one of them.
    */
   place() {
     const room = this.el.getBoundingClientRect();
     const card = part(this.el, ".urc-lost-card").getBoundingClientRect();
     const { paddingTop, paddingBottom } = getComputedStyle(this.el);
+    const isTall = isPortraitPhone() && this.root.querySelector('.urc-grid > [data-place="ground"]') !== null;
+    const bottom = room.bottom - parseFloat(paddingBottom) + this.footPx;
+    const isFilled = isTall && this.fill(room.top, bottom);
+    this.el.toggleAttribute("data-fills", isFilled);
+    if (isFilled) {
+      this.el.removeAttribute("data-top");
+      return;
+    }
+    this.footPx = 0;
     const { height } = card;
     const old = this.root.querySelectorAll('.urc-cell[data-old]:not([data-place="ground"], [data-footprint="view"])');
     const values = [...old].filter((el) => el.checkVisibility()).map((el) => el.getBoundingClientRect());
     const covers = (/** @type {number} */ y) =>
       values.filter((one) => one.left < card.right && one.right > card.left && one.top < y + height && one.bottom > y).length;
-    const below = covers(room.bottom - parseFloat(paddingBottom) - height);
+    const below = covers(bottom - height);
     this.el.toggleAttribute("data-top", covers(room.top + parseFloat(paddingTop)) < below);
+  }
+
+  /**
+   * Fill the place of the controls, between the cells that stay in sight. If it is too low for the card,
+   * the card also takes the place of the views, or else lies over the background.
+   *
+   * @param {number} top first pixel of the stage on the screen
+   * @param {number} bottom last pixel above STOP and its row
+   * @returns {boolean} whether the card has a place
+   */
+  fill(top, bottom) {
+    const ground = [...this.root.querySelectorAll('.urc-grid > [data-place="ground"]')].map(boxOf);
+    const views = [...this.root.querySelectorAll(VIEWS)];
+    const kept = [...this.root.querySelectorAll(KEPT)].map(boxOf);
+    const need = naturalHeight(part(this.el, ".urc-lost-card"));
+    const seen = [...kept, ...views.map(boxOf)];
+    const places = [[...seen, ...ground], [...kept, ...ground], seen].map((boxes) => largestGap(boxes, top, bottom));
+    const at = places.findIndex((one) => one.bottom - one.top >= need);
+    const place = places[at];
+    for (const view of views) view.toggleAttribute("data-behind", at === 1 && !!place && boxOf(view).bottom > place.top && boxOf(view).top < place.bottom);
+    if (!place) return false;
+    this.footPx = Math.max(0, Math.round(bottom - place.bottom));
+    this.el.style.setProperty("--urc-lost-height", at === 2 ? "auto" : `${Math.round(place.bottom - place.top)}px`);
+    this.el.style.setProperty("--urc-lost-foot", `${this.footPx}px`);
+    return true;
   }
 
   /** @param {Loss} loss */
@@ -117,6 +160,42 @@ export class LostCard {
     const hints = JSON.parse(this.el.dataset["hints"] ?? "{}");
     return Object.hasOwn(hints, transport) ? String(hints[transport]) : "";
   }
+}
+
+function isPortraitPhone() {
+  return matchMedia("(width < 37.5rem)").matches;
+}
+
+/** @param {Element} el */
+function boxOf(el) {
+  return el.getBoundingClientRect();
+}
+
+/** Return the height that the card needs, also while it is higher. @param {HTMLElement} card */
+function naturalHeight(card) {
+  const { paddingTop, paddingBottom, borderTopWidth, borderBottomWidth, rowGap } = getComputedStyle(card);
+  const parts = [...card.children].map((one) => boxOf(one).height).filter((height) => height > 0);
+  const edges = [paddingTop, paddingBottom, borderTopWidth, borderBottomWidth].map(parseFloat);
+  return [...parts, ...edges, (parts.length - 1) * parseFloat(rowGap)].reduce((sum, one) => sum + one, 0);
+}
+
+/**
+ * Return the largest free height between boxes of a screen, without a gap at each box.
+ *
+ * @param {readonly {top: number, bottom: number}[]} boxes in pixels; empty ones do not count
+ * @param {number} top first pixel of the screen that counts
+ * @param {number} bottom last pixel of the screen that counts
+ * @returns {{top: number, bottom: number}} may be empty
+ */
+export function largestGap(boxes, top, bottom) {
+  const sorted = boxes.filter((one) => one.bottom > one.top && one.top < bottom).sort((one, other) => one.top - other.top);
+  let free = { top: bottom, bottom };
+  let from = top;
+  for (const to of [...sorted.map((one) => one.top - GAP_PX), bottom]) {
+    if (to - from > free.bottom - free.top) free = { top: from, bottom: to };
+    for (const one of sorted) if (one.top - GAP_PX <= to) from = Math.max(from, one.bottom + GAP_PX);
+  }
+  return free;
 }
 
 /**
