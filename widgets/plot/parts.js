@@ -78,6 +78,7 @@ export function legendItem(name, shared, hint, isShown) {
   button.title = hint;
   const [swatch, title, value] = [span("swatch"), span("name"), span("value", "—")];
   title.append(span("shared", name.slice(0, shared)), name.slice(shared));
+  title.dataset["textCut"] = ""; // a small plot shortens the name, never the value
   button.append(swatch, title, roomFor(value));
   item.append(button);
   return { item, button };

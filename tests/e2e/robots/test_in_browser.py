@@ -64,7 +64,7 @@ NAVIGATION = {"navigate", "stop_navigation", "place", "follow", "stop_route"}
 WITHOUT = {
     "generic-ros2": NAVIGATION,
     "turtlebot3": NAVIGATION,
-    "ur-ros2": {"move", "cancel", "go_back", "tool_mode", "joint_mode", "goal_mode"},
+    "ur-ros2": {"move", "cancel", "go_back", "keep", "tool_mode", "joint_mode", "goal_mode"},
     "turtlebot4": {"stop_docking", "stop_undocking", *NAVIGATION},
 }
 """Commands that are not given here. The docking of an emulated robot ends at once, and what has
