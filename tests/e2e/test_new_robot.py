@@ -5,7 +5,7 @@ import logging
 from pathlib import Path
 
 import pytest
-from httpx import AsyncClient
+from httpx2 import AsyncClient
 from playwright.async_api import expect
 
 from tests.e2e.browser import PAGE_TIMEOUT_MS
