@@ -42,6 +42,8 @@ OPERATOR: Final = "this page"
 """Name of the only operator, for the alarms."""
 NONCE: Final = "playground"
 """Static files have no policy that would ask for a nonce."""
+_LOOK_S: Final = 0.02
+"""Interval between two looks whether the earlier robot has been replaced, in seconds."""
 _SHELVES: Final = ("drivers", "interfaces", "models")
 
 
@@ -57,7 +59,7 @@ class Playground:
         self._service: RobotService | None = None
         self._tasks: set[asyncio.Task[None]] = set()
 
-    def open(self, text: str) -> str | None:
+    async def open(self, text: str) -> str | None:
         """Load a document as the robot, in place of an earlier one; return its name.
 
         Nothing is replaced while the earlier robot is not at rest: the result is then None.
@@ -72,6 +74,9 @@ class Playground:
             self._start(service.run())
         elif service.is_at_rest:
             service.replace(robot)
+            # Until the switch, pages would show the earlier robot.
+            while service.is_switching:  # noqa: ASYNC110  # the switch has no event
+                await asyncio.sleep(_LOOK_S)
         else:
             return None
         return robot.profile.name

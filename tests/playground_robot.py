@@ -88,7 +88,7 @@ async def until(is_so: Callable[[], object]) -> None:
 async def drive(text: str, folder: Path) -> dict[str, Any]:
     """Drive a robot, let go, press STOP and try to drive again; return what the page was told."""
     playground, page = Playground(folder), Page()
-    name = playground.open(text)
+    name = await playground.open(text)
     assert f"/ws?robot={name}" in playground.page("")
     page.line = playground.connect(f"ws://page/ws?robot={name}", page)
     told: dict[str, Any] = {}
@@ -118,6 +118,13 @@ async def drive(text: str, folder: Path) -> dict[str, Any]:
     await page.hold(0.5, speed=0.3, turn=0)
     told["refused_after_stop"] = page.refused != [] or page.lease["holder"] is None
     told["stopped_m_s"] = page.values["speed"]
+    await until(lambda: page.lease["holder"] is None)
+    edited = text.replace("title: TurtleBot 4\n", "title: Edited robot\n", 1)
+    async with asyncio.timeout(60):
+        # The stop may still be due.
+        while await playground.open(edited) is None:  # noqa: ASYNC110  # a rest has no event
+            await asyncio.sleep(0.02)
+    told["shows_edit"] = "Edited robot" in playground.page("")
     page.line.hang_up()
     others = asyncio.all_tasks() - {asyncio.current_task()}
     for task in others:

@@ -76,6 +76,7 @@ def test_the_turtlebot_is_driven_let_go_and_stopped(tmp_path: Path) -> None:
     told = run(_DRIVE, str(tmp_path))
     assert isinstance(told, dict)
     assert told["picture"] == "image/png"
+    assert told["shows_edit"], "a page after an edit shows the earlier robot"
     assert told["driven_m_s"] > 0.05
     assert told["pictures_later"] > 1
     assert told["let_go_m_s"] == 0.0

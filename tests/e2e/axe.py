@@ -13,7 +13,7 @@ CONTRAST = "color-contrast"
 
 _RUN = """
 async (rules) => {
-  // A colour between two themes is none of either, and a card that appears is not yet opaque.
+  // During a transition or an animation, colours are neither those before nor those after.
   const fades = document.getAnimations().filter((one) =>
     one.playState === "running" && Number.isFinite(one.effect.getComputedTiming().endTime));
   await Promise.allSettled(fades.map((one) => one.finished));

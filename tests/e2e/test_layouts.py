@@ -378,7 +378,7 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
 async def test_a_blurred_copy_surrounds_a_picture_that_does_not_fill_the_page(
     new_page: PageMaker,
 ) -> None:
-    """Dimmed, so that nobody takes it for a part of the picture; only where there is room."""
+    """It is dimmed, so it does not look like a part of the picture; only where there is room."""
     signals = {"front": Signal("front", "image")}
     uses = [USES[0], WidgetUse("front", "camera", {"image": "front"})]
     profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))

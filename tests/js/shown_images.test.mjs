@@ -39,7 +39,7 @@ test("of two widgets with one camera, the one with the newer image counts", () =
   assert.deepEqual(images.report("front", 1001), [8, 1]);
 });
 
-test("a new connection numbers its images anew", () => {
+test("image numbers start again with a new connection", () => {
   const images = new ShownImages();
   images.show(front(7, 900), 1000);
   images.clear();

@@ -11,7 +11,7 @@ The permitted speed falls linearly between two ages. Motion ends at the second a
 
 import math
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeGuard
 
 from urc.model.exchange import Sight
 from urc.model.values import Reading
@@ -134,16 +134,15 @@ def slowed(
     return found
 
 
-def _slowed(wanted: object, rest: object, share: float) -> Reading:
+def _slowed(wanted: Reading, rest: object, share: float) -> Reading:
     if not _is_number(wanted):
-        return wanted  # type: ignore[return-value]  # refused later
+        return wanted  # refused later
     base = rest if _is_number(rest) else 0
-    far = (wanted - base) * share  # type: ignore[operator]  # both are numbers
-    if isinstance(wanted, int):
-        return int(base) + math.trunc(far)  # type: ignore[call-overload,no-any-return]
-    return base + far  # type: ignore[no-any-return]
+    far = (wanted - base) * share
+    return int(base) + math.trunc(far) if isinstance(wanted, int) else base + far
 
 
-def _is_number(value: object) -> bool:
-    is_plain = isinstance(value, (int, float)) and not isinstance(value, bool)
-    return is_plain and math.isfinite(value)  # type: ignore[arg-type]
+def _is_number(value: object) -> TypeGuard[int | float]:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return math.isfinite(value)

@@ -1,4 +1,4 @@
-"""Driving by a camera, in a real browser: whoever sees an old image drives slowly, and then stops.
+"""Driving by a camera, in a real browser: an old image slows the robot, and then stops it.
 
 The declared ages are those of `SIGHT`; the robot must stop at most `MARGIN_S` after the second one.
 """

@@ -368,7 +368,7 @@ async def test_a_cancellation_without_an_answer_delays_neither_stops_nor_a_new_g
 async def test_a_reset_ends_unanswered_cancellations_of_all_goals(
     tmp_path: Path, motion: Motion
 ) -> None:
-    """On later connections too; each of them would end a new goal, whoever has sent it."""
+    """Also on later connections, because each repetition would end new goals of all programs."""
     path = tmp_path / "rover.yaml"
     path.write_text(GUARDED)
     rover = load_profile(path, built_in_catalog())

@@ -212,7 +212,7 @@ async def test_two_programs_that_publish_the_clock_do_not_fill_the_log(file: Pat
                 for sec in (9, 2):
                     _clock(rover, sec)
                 await asyncio.sleep(0.01)
-            while value(robot, "frames") is None:  # all earlier messages have then arrived
+            while value(robot, "frames") is None:  # it arrives after all earlier messages
                 _transform(rover, 3, 1.0)
                 await asyncio.sleep(0.05)
             assert len(notes()) == 3

@@ -307,7 +307,7 @@ async def test_a_route_of_another_screen_disappears_when_it_ends(new_page: PageM
 async def test_after_a_new_session_a_route_is_ended_by_the_robots_feedback(
     new_page: PageMaker,
 ) -> None:
-    """Nobody knows the points of a route that another program sends; nothing false is shown."""
+    """The points of another program's route are unknown, so the map shows none."""
     page = await new_page(size="desktop")
     async with followed(page) as robot:
         await drawn(page, (1, 0), (2, 0))

@@ -1,4 +1,4 @@
-"""Whoever sees an old image drives slowly, and whoever sees none does not drive."""
+"""An old image slows a motion; without an image, there is no motion."""
 
 import math
 
@@ -59,7 +59,7 @@ def test_a_page_that_reports_nothing_is_blind() -> None:
     "lie",
     [
         SeenImage(8, 0.0),  # not sent yet
-        SeenImage(6, 0.0),  # sent to somebody else
+        SeenImage(6, 0.0),  # sent to another page
         SeenImage(7, 0.2),  # shown before it was sent
         SeenImage(7, -0.1),  # shown in the future
         SeenImage(7, math.nan),

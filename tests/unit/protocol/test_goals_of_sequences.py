@@ -39,7 +39,7 @@ sequences:
 
 
 class Told:
-    """A running sequence, and what the engine tells of its goals."""
+    """A running sequence, and the engine's reports of its goals."""
 
     def __init__(self, engine: Engine, command: str) -> None:
         self.engine = engine

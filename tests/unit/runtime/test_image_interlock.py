@@ -25,7 +25,7 @@ def scene(*, command: Command = DRIVE) -> Scene:
 
 
 def again(it: Scene, who: str = "ann") -> None:
-    """Let go, and take the controls anew, as a page does at the next push."""
+    """Let go, and take control again, as a page does at the next push."""
     it.controller.release(who, "drive")
     it.drive(who, "take")
     it.heard()
@@ -45,7 +45,7 @@ def test_an_older_image_moves_more_slowly() -> None:
 
 
 def test_an_image_that_is_too_old_ends_the_motion() -> None:
-    """Whoever holds on moves nothing, not even by a new image: it takes a new push."""
+    """A control that stays held moves nothing, even with a new image; motion needs a new push."""
     it = scene()
     refused: list[tuple[str, str]] = []
     it.controller.on_refused = lambda command, why: refused.append((command, why))

@@ -365,6 +365,11 @@ class RobotService:
         return is_free and not self.has_goal
 
     @property
+    def is_switching(self) -> bool:
+        """Whether another version of the robot waits for the end of the open session."""
+        return self._successor is not None
+
+    @property
     def is_open(self) -> bool:
         """Whether a session is open, opening or closing."""
         return self._is_open
