@@ -41,7 +41,15 @@ VENDORED = {
     "urdf-loader": ("src/URDFLoader.js", "src/URDFClasses.js", "README.md"),
     "@xterm/xterm": ("lib/xterm.mjs", "css/xterm.css", "LICENSE"),
     "@xterm/addon-fit": ("lib/addon-fit.mjs", "LICENSE"),
+    "@fontsource-variable/inter": (
+        "files/inter-latin-wght-normal.woff2",
+        "files/inter-latin-ext-wght-normal.woff2",
+        "LICENSE",
+    ),
 }
+
+# Packages without a module; style sheets name their files.
+FONTS = {"@fontsource-variable/inter"}
 
 # Where a package's manifest names no module that a browser can load.
 ENTRIES: dict[str, str] = {}
@@ -163,6 +171,8 @@ def collect(modules: Path, vendor: Path, root: Path) -> Path:
             shutil.copyfile(source, target)
         if package in LICENCES:
             shutil.copyfile(root / LICENCES[package], vendor / package / "LICENSE")
+        if package in FONTS:
+            continue
         entry = entry_point(json.loads((modules / package / "package.json").read_text("utf-8")))
         entry = ENTRIES.get(package, entry)
         if entry not in files:

@@ -24,8 +24,9 @@ HOSTILE = '"><script>alert(1)</script><img src=x onerror=alert(1)>{{ 7*7 }}'
 
 CONTENT_POLICY = (
     "default-src 'none'; script-src 'nonce-NONCE' 'strict-dynamic'; "
-    "style-src 'self' 'nonce-NONCE'; img-src 'self' data: blob:; connect-src 'self'; "
-    "frame-src 'self'; worker-src 'self'; manifest-src 'self'; base-uri 'none'; "
+    "style-src 'self' 'nonce-NONCE'; img-src 'self' data: blob:; font-src 'self'; "
+    "connect-src 'self'; frame-src 'self'; worker-src 'self'; manifest-src 'self'; "
+    "base-uri 'none'; "
     "form-action 'none'; "
     "object-src 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; "
     "trusted-types urc"
