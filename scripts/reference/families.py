@@ -159,7 +159,8 @@ FAMILIES: Mapping[str, Family] = {
         "Keys of alarms",
         "Keys of limits and alarm states, with priority, cause and operator action.",
         _driver(
-            "limits alarmLimit alarmAttributes alarmPriority alarmCause alarmAction suppressedWhen"
+            "limits alarmLimit alarmAttributes alarmPriority alarmCause alarmAction alarmCommand"
+            " suppressedWhen"
         ),
         {"alarms.md": "Alarms"},
     ),

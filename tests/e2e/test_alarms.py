@@ -10,7 +10,10 @@ from playwright.async_api import Page
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, until, until_text
 from tests.e2e.motion.driving import CALM_LEASE_S, USES, commands
+from urc.model.driver import Command
+from urc.model.exchange import Confirm
 from urc.model.interface import WidgetUse
+from urc.model.payload import WriteSpec
 from urc.model.values import AlarmAttributes, AlarmLimits, Signal
 from urc.runtime.alarm_table import AlarmQuery, search_alarms
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -151,6 +154,39 @@ async def test_an_acknowledgement_holds_on_every_screen(new_page: PageMaker) -> 
         for page in (one, other):
             await until_text(page, ".alerts-note", "0 not acknowledged")
             await page.locator(".alerts-more", has_text="✓ acknowledged by").wait_for()
+
+
+async def test_the_strip_presses_the_button_of_the_page_that_carries_out_the_action(
+    new_page: PageMaker,
+) -> None:
+    """The button asks as usual; while it may not be pressed, the strip does not offer it."""
+    dock = Command(
+        "dock", "wire", WriteSpec("text", {}), confirm=Confirm(level="normal", text="It drives.")
+    )
+    told = LOW._replace(command="dock")
+    battery = BATTERY._replace(limits=AlarmLimits(low=20, attributes=(("low", told),)))
+    profile = dashboard_profile(
+        uses=[*USES, WidgetUse("home", "button", {}, {"press": "dock"}, title="Dock")],
+        signals={"battery": battery},
+        commands=commands(CALM_LEASE_S) | {"dock": dock},
+    )
+    robot = FakeRobot(profile)
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("battery", 15, alarm="low")
+        help_button = page.locator("[data-alarm-help]")
+        await until_text(page, "[data-alarm-help]", "Dock")
+        await help_button.click()
+        await page.locator(".urc-asking", has_text="It drives.").wait_for()
+        assert robot.commands == []
+        await help_button.wait_for(state="hidden")  # its button asks already
+        await page.get_by_role("button", name="Yes").click()
+        await until(lambda: robot.commands == [("dock", {})])
+        await help_button.wait_for()
+        robot.link("lost")
+        await help_button.wait_for(state="hidden")
 
 
 async def test_a_watching_page_shows_alarms_and_offers_no_action(new_page: PageMaker) -> None:

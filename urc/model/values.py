@@ -88,6 +88,8 @@ class AlarmAttributes(NamedTuple):
     """Usual cause of the alarm."""
     action: str = ""
     """Operator action."""
+    command: str = ""
+    """Command that carries out the action; "" means none."""
     suppressed_when: Template | None = None
     """Expression using signals; while the expression is true, the alarm is suppressed by design."""
 

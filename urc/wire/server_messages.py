@@ -363,6 +363,8 @@ class AlarmRow(msgspec.Struct, omit_defaults=True, frozen=True):
     shelved_by: str = ""
     cause: str = ""
     action: str = ""
+    command: str = ""
+    """Command that carries out the action."""
     title: str = ""
     """The signal's title."""
 

@@ -404,6 +404,22 @@ def test_good_document_imports_neither_jsonschema_nor_an_event_loop() -> None:
     assert (done.stderr, done.stdout.strip()) == ("", "[]")
 
 
+def test_the_command_of_an_alarm_must_exist(checked: Checker) -> None:
+    found = checked(
+        HEAD
+        + WIRE
+        + MESSAGE
+        + """
+signals:
+  battery: { type: integer, limits: { lolo: { at: 10, command: lend } } }
+commands:
+  land: { send: "land" }
+"""
+    )
+    said = [(one.path, one.hint) for one in found.problems if one.code == "unknown-command"]
+    assert said == [("signals.battery.limits.lolo.command", "did you mean 'land'?")]
+
+
 def test_attributes_of_limits_are_the_defaults_of_each_alarm(checked: Checker) -> None:
     """A limit or state overrides single attributes; the rest comes from the signal's limits."""
     profile = checked.profile(
@@ -416,11 +432,13 @@ signals:
     type: integer
     limits:
       low: { at: 20, priority: low }
-      lolo: { at: 10, action: Land., suppressed_when: mode == 'docked' }
+      lolo: { at: 10, action: Land., command: land, suppressed_when: mode == 'docked' }
       off_delay: 2s
       cause: It is used.
       suppressed_when: battery == 0
   mode: { type: string, limits: { states: { lost: { priority: high }, idle: {} } } }
+commands:
+  land: { send: "land" }
 """
     )
     limits = profile.driver.signals["battery"].limits
@@ -428,6 +446,7 @@ signals:
     low, lolo = limits.attributes_of("low"), limits.attributes_of("lolo")
     assert (low.priority, low.cause, low.action) == ("low", "It is used.", "")
     assert (lolo.priority, lolo.cause, lolo.action) == ("high", "It is used.", "Land.")
+    assert (low.command, lolo.command) == ("", "land")
     sources = [one.suppressed_when and one.suppressed_when.source for one in (low, lolo)]
     assert sources == ["battery == 0", "mode == 'docked'"]
     states = profile.driver.signals["mode"].limits

@@ -1,4 +1,4 @@
-"""Checks computed signals for unknown names and for cycles."""
+"""Checks computed signals for unknown names and for cycles, and the names in alarm limits."""
 
 from collections.abc import Callable, Iterable, Mapping
 
@@ -15,10 +15,10 @@ _Check = Callable[[Node, Template, Iterable[str]], None]
 
 
 def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) -> None:
-    """Check every computed signal at `part`; `check` checks the names in a template."""
+    """Check computed signals and alarms at `part`; `check` checks the names in a template."""
     set_by_frames = _set_by_frames(driver)
     for name, inner in part.named("signals").items():
-        _link_suppression(inner, driver.signals[name], driver, check)
+        _link_alarms(inner, driver.signals[name], driver, check, problems)
         formula = driver.signals[name].formula
         if formula is None:
             continue
@@ -49,19 +49,28 @@ def link_signals(part: Node, driver: Driver, check: _Check, problems: Problems) 
             )
 
 
-def _link_suppression(part: Node, signal: Signal, driver: Driver, check: _Check) -> None:
-    """Check the names in the expressions that suppress a signal's alarms."""
+def _link_alarms(
+    part: Node, signal: Signal, driver: Driver, check: _Check, problems: Problems
+) -> None:
+    """Check the names in the expressions and commands of a signal's alarms."""
     limits = part.get("limits")
     if limits is None or signal.limits.is_empty:
         return
     checked = set()
     for name, attributes in signal.limits.attributes:
         own = limits.named("states").get(name) or limits.must(name)
-        is_own = isinstance(own.data, dict) and "suppressed_when" in own.data
-        place = own if is_own else limits
+        places = {
+            key: own if isinstance(own.data, dict) and key in own.data else limits
+            for key in ("suppressed_when", "command")
+        }
+        place = places["suppressed_when"]
         if attributes.suppressed_when is not None and place.path not in checked:
             checked.add(place.path)
             check(place.must("suppressed_when"), attributes.suppressed_when, driver.signals)
+        command = attributes.command
+        if command and command not in driver.commands:
+            place = places["command"].must("command")
+            problems.unknown(place, "unknown-command", command, driver.commands)
 
 
 def _set_by_frames(driver: Driver) -> dict[str, str]:

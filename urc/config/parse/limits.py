@@ -166,6 +166,7 @@ def _attributes(
             priority=own.text("priority", base),  # type: ignore[arg-type]  # the schema's enum
             cause=own.text("cause", part.text("cause")),
             action=own.text("action", part.text("action")),
+            command=own.text("command", part.text("command")),
             suppressed_when=_suppression(own, problems) or shared,
         )
         if attributes != usual.attributes_of(name):

@@ -244,6 +244,7 @@ def _info(record: AlarmRecord, signals: Mapping[str, Signal]) -> AlarmInfo:
         unit=signal.unit,
         cause=attributes.cause,
         action=attributes.action,
+        command=attributes.command,
         number=record.number,
         group=record.group,
         raised=record.raised,

@@ -56,6 +56,8 @@ class AlarmInfo(AlarmMessage, frozen=True):
     """Probable cause of the alarm, from the robot's document."""
     action: str
     """Operator action."""
+    command: str
+    """Command that carries out the action; "" if the robot's document names none."""
     number: int
     """Number of the activation; numbers increase in first-out order."""
     group: int

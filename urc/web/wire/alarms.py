@@ -62,5 +62,6 @@ def alarm_row(record: AlarmRecord, signals: Mapping[str, Signal]) -> AlarmRow:
         shelved_by=record.shelved_by,
         cause=attributes.cause,
         action=attributes.action,
+        command=attributes.command,
         title=signal.title,
     )

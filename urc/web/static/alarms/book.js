@@ -27,6 +27,7 @@
  * @property {string} shelved_by
  * @property {string} cause
  * @property {string} action
+ * @property {string} command Command that carries out the action.
  * @property {string} title Title of the signal.
  *
  * @typedef {Partial<AlarmRow> & Pick<AlarmRow, "signal">} SentRow The server omits default values.
@@ -45,7 +46,7 @@
 const USUAL = {
   signal: "", condition: "", priority: "medium", state: "unacknowledged", number: 0, group: 0, raised: 0, began: 0,
   value: "", active: false, known: false, times: 1, returned: 0, acknowledged: 0, acknowledged_by: "",
-  shelved_until: 0, shelved_by: "", cause: "", action: "", title: "",
+  shelved_until: 0, shelved_by: "", cause: "", action: "", command: "", title: "",
 };
 /** @type {Priority[]} */
 const PRIORITIES = ["high", "medium", "low"];

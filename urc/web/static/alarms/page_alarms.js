@@ -13,6 +13,7 @@ import { reason } from "../core/api_client.js";
 import { t } from "../core/words.js";
 import { AlarmActions } from "./actions.js";
 import { AlarmBook, levelOf } from "./book.js";
+import { readyButton } from "./buttons.js";
 import { lineOf, moreAlarms, stateWords, titleOf } from "./phrases.js";
 import { AlarmSheet } from "./sheet.js";
 import { ALWAYS, AlarmSound } from "./sound.js";
@@ -61,6 +62,7 @@ export class PageAlarms {
     this.strip = new AlarmStrip(strip, {
       open: () => (this.sheet.isOpen ? this.sheet.close() : this.open()),
       acknowledge: (row) => void this.acknowledge([row]),
+      buttonFor: (command) => readyButton(root, command),
     });
     root.addEventListener("click", (event) => {
       // A press in the sheet may reorder the list or open a burst.

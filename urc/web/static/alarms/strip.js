@@ -1,7 +1,8 @@
 // @ts-check
 /**
- * The strip under the bar, shown only during alarms: the most urgent alarm, its action, and the
- * number of all alarms. A tap opens the list. The strip flashes until the alarms are acknowledged.
+ * The strip under the bar, shown only during alarms: the most urgent alarm, its action, a button for
+ * the command of this action, and the number of all alarms. A tap opens the list. The strip flashes
+ * until the alarms are acknowledged.
  *
  * @typedef {import("./book.js").AlarmBook} AlarmBook
  * @typedef {import("./book.js").AlarmRow} AlarmRow
@@ -15,10 +16,14 @@ import { lineOf, moreAlarms, SIGNS } from "./phrases.js";
 export class AlarmStrip {
   /**
    * @param {HTMLElement} el
-   * @param {{open: () => void, acknowledge: (row: AlarmRow) => void}} deeds
+   * @param {object} doors
+   * @param {() => void} doors.open
+   * @param {(row: AlarmRow) => void} doors.acknowledge
+   * @param {(command: string) => HTMLElement | null} doors.buttonFor finds the page's button for a command
    */
-  constructor(el, { open, acknowledge }) {
+  constructor(el, { open, acknowledge, buttonFor }) {
     this.el = el;
+    this.buttonFor = buttonFor;
     this.sign = made("span", { class: "urc-alarm-sign", "aria-hidden": "true" });
     this.line = made("span", { class: "urc-alarm-line" });
     this.action = made("span", { class: "urc-alarm-action" });
@@ -36,6 +41,9 @@ export class AlarmStrip {
       made("span", { class: "urc-alarm-seen-sign", "aria-hidden": "true" }, "✓"),
       made("span", { class: "urc-alarm-seen-word" }, t("Acknowledge")),
     );
+    /** The page's button for the shown alarm's command. @type {HTMLElement | null} */
+    this.helper = null;
+    this.help = made("button", { class: "urc-button", type: "button", "data-alarm-help": true, onclick: () => this.helper?.click() });
     const text = made("span", { class: "urc-alarm-text" }, this.line, this.action);
     this.open = made(
       "button",
@@ -44,7 +52,7 @@ export class AlarmStrip {
       text,
       this.more,
     );
-    el.append(this.open, this.seen);
+    el.append(this.open, this.help, this.seen);
   }
 
   /**
@@ -67,6 +75,9 @@ export class AlarmStrip {
     write(this.line, first.active ? line : t("{alarm}: back to normal", { alarm: line }));
     write(this.action, first.active ? first.action : "");
     write(this.more, moreAlarms(listed.length - 1));
+    this.helper = first.active && first.command ? this.buttonFor(first.command) : null;
+    this.help.hidden = this.helper === null;
+    write(this.help, this.helper?.dataset["presses"] ?? "");
     this.seen.hidden = !mayAct || first.state === "acknowledged";
   }
 }
