@@ -324,11 +324,11 @@ async def test_a_touch_user_sees_hints_once_that_cover_no_control(new_page: Page
         await page.reload()
         await page.get_by_role("button", name="Got it").click()
         await page.reload()
-        await expect(page.locator("[data-who]")).to_contain_text("driving")
+        await expect(page.locator("[data-who]")).to_contain_text("Free to drive")
         await expect(hints).to_have_count(0)
         mouse = await new_page(size="desktop", is_first=True)
         await mouse.goto(address)
-        await expect(mouse.locator("[data-who]")).to_contain_text("driving")
+        await expect(mouse.locator("[data-who]")).to_contain_text("Free to drive")
         await expect(mouse.get_by_role("region", name="Hints")).to_have_count(0)
 
 
@@ -429,6 +429,32 @@ async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker)
         await robot.until_stopped()
         await page.reload()
         await expect(front).to_be_visible()
+
+
+async def test_the_buttons_of_the_background_are_in_the_bar(new_page: PageMaker) -> None:
+    """A swapped view takes its buttons along; on a phone in portrait, they are in the picture."""
+    signals = {name: Signal(name, "image", title=name.title()) for name in ("front", "rear")}
+    uses = [WidgetUse(name, "camera", {"image": name}) for name in signals]
+    grid = Layout(2, 3, (Slot("rear", 0, 0),))
+    interface = Interface("x", "X", {"landscape": grid}, background="front")
+    profile = dashboard_profile(signals=signals, uses=uses)
+    robot = FakeRobot(profile._replace(interfaces={"x": interface}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        in_bar = page.locator(".urc-bar [aria-label='Save picture']")
+        await expect(in_bar).to_have_count(1)
+        await expect(page.locator("[data-stage] [aria-label='Save picture']")).to_have_count(1)
+        robot.set_reading("rear", plain(RED))
+        await page.click("[aria-label='Show Rear large']")
+        await expect(in_bar).to_be_enabled()
+        await expect(page.locator("[data-cell='0'] [aria-label='Save picture']")).to_have_count(1)
+        async with page.expect_download() as saved:
+            await in_bar.click()
+        assert (await saved.value).suggested_filename.startswith("rear-")
+        await page.set_viewport_size({"width": 390, "height": 844})
+        await expect(in_bar).to_have_count(0)
+        await expect(page.locator(f"{GROUND} [aria-label='Save picture']")).to_be_visible()
 
 
 async def test_the_cameras_of_the_background_are_chosen_by_mouse_and_touch(

@@ -3,7 +3,7 @@
  * The placement of an image in its box. Pure: no DOM.
  *
  * @typedef {"contain" | "cover" | "fill" | "ground"} Fit "ground": as "cover", but with the lower edge of the
- *   image, and without more than a third of it lost
+ *   image; as "contain" if more than a third of the image were lost
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -17,7 +17,7 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Maximum enlargement of an image as the background: two thirds of the image stay visible. */
+/** Maximum enlargement of an image that fills the background: two thirds of the image stay visible. */
 const MOST_ZOOM = 1.5;
 
 /**
@@ -33,7 +33,8 @@ export function place(picture, box, { fit, rotate, mirror }) {
   const [wide, high] = [box.width / Math.max(1, across), box.height / Math.max(1, down)];
   const whole = Math.min(wide, high);
   const filled = Math.max(wide, high);
-  const scale = fit === "cover" ? filled : fit === "ground" ? Math.min(filled, whole * MOST_ZOOM) : whole;
+  const isFilled = fit === "cover" || (fit === "ground" && filled <= whole * MOST_ZOOM);
+  const scale = isFilled ? filled : whole;
   const [scaleX, scaleY] = fit === "fill" ? [wide, high] : [scale, scale];
   const [width, height] = isLying
     ? [picture.width * scaleY, picture.height * scaleX]

@@ -45,6 +45,8 @@ class Camera {
     this.age = part(el, ".camera-age");
     this.note = part(el, ".camera-note");
     this.tools = part(el, ".camera-tools");
+    /** The buttons that move to the bar while the camera is the background. */
+    this.more = part(el, ".camera-more");
     this.title = part(el, ".camera-title").textContent ?? "";
     const canvas = el.querySelector("canvas");
     if (!canvas) throw new Error("the template has no canvas");
@@ -101,10 +103,11 @@ class Camera {
    * @param {string} sign
    * @param {string} name
    * @param {() => void} press
+   * @param {HTMLElement} [group]
    */
-  addButton(sign, name, press) {
+  addButton(sign, name, press, group = this.more) {
     const made = button("camera-button urc-view-button", sign, press, { signal: this.signal, label: name });
-    this.tools.append(made);
+    group.append(made);
     return made;
   }
 
@@ -177,7 +180,7 @@ class Camera {
   showSwitches() {
     const isFirst = !this.switches;
     this.switches ??= this.sources.map((_, index) => {
-      const made = this.addButton("", "", () => this.choose(index));
+      const made = this.addButton("", "", () => this.choose(index), this.tools);
       attribute(made, "aria-pressed", String(index === this.chosen));
       return made;
     });

@@ -64,7 +64,7 @@ class Panorama {
     this.face = part(el, ".pano360-face");
     this.where = part(el, ".pano360-where");
     this.note = part(el, ".pano360-note");
-    this.tools = part(el, ".pano360-tools");
+    this.tools = part(el, ".pano360-more");
     /** @type {View} */
     this.home = turned(
       { yaw: 0, pitch: 0, fov: Number(options["field_of_view"] ?? 75) },

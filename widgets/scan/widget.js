@@ -126,7 +126,7 @@ class Scan {
       this.resize();
     };
     button.addEventListener("click", next, { signal });
-    this.root.append(button);
+    part(this.root, ".scan-tools").append(button);
   }
 
   theme() {

@@ -132,7 +132,7 @@ class Scene {
     };
     label();
     button.addEventListener("click", press, { signal: this.signal });
-    this.root.append(button);
+    part(this.root, ".scene3d-tools").append(button);
   }
 
   /** @param {KeyboardEvent} event */

@@ -14,6 +14,7 @@
 import { part } from "./badge.js";
 import { watchDrawer } from "./drawer.js";
 import { keepFloatsFree } from "./floats.js";
+import { keepBarTools } from "./bar_tools.js";
 import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
 import { watchRest } from "./rest_page.js";
@@ -63,8 +64,9 @@ export class ViewSwitch {
   enter() {
     const { host, input, wake } = this.doors;
     swapViews(this.el);
-    host.mountAll(this.el);
     this.ends = new AbortController();
+    keepBarTools(part(this.root, "[data-bar-place]"), this.el, this.ends.signal);
+    host.mountAll(this.el);
     keepFloatsFree(this.el, this.ends.signal);
     const letGo = () => input.letGo(t("another page was opened"));
     tabsOf(this.el, letGo);
