@@ -217,8 +217,13 @@ def _is_like(found: Envelope, wanted: Envelope) -> bool:
 
 
 def _addressed(message: Envelope) -> Mapping[str, object]:
-    """Return the attributes; the names of ROS 2 and ROS 1 for a type are the same."""
+    """Return the attributes; the names of ROS 2 and ROS 1 for a type are the same.
+
+    rosbridge calls a service without its type.
+    """
     attributes = dict(message.attributes)
+    if message.verb == "call":
+        attributes.pop("type", None)
     if "type" in attributes:
         attributes["type"] = str(attributes["type"]).replace("/msg/", "/")
     return attributes

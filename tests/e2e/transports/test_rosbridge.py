@@ -13,6 +13,7 @@ import pytest
 from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 
+from scripts.node import node_executable
 from tests.e2e.ports import free_port
 from tests.e2e.transports.leaks import nothing_left
 from tests.e2e.transports.programs import listens, program
@@ -379,7 +380,7 @@ async def test_roslibpy_takes_the_emulated_robot_for_a_bridge(rover: Profile) ->
 async def test_roslib_takes_the_emulated_robot_for_a_bridge(rover: Profile) -> None:
     """In JavaScript, with its own decoders of CBOR and PNG, and an action of ROS 2."""
     async with nothing_left(), emulated(rover) as port:
-        said = await run("node", str(CLIENTS / "roslib_client.mjs"), str(port))
+        said = await run(node_executable() or "node", str(CLIENTS / "roslib_client.mjs"), str(port))
     assert said["topics"]["topics"] == ["/cmd_vel", "/odom"]
     for compression in ("none", "cbor", "png"):
         assert said[compression] == {"data": f"grüezi by {compression}", "values": [1.5, None]}
