@@ -55,9 +55,13 @@ class Field:
     value: str
     """Entered value; always "" for a secret."""
     default: str
-    """Value used while the field is empty; "" if there is no default."""
+    """Value used while the field is empty; "" for a choice, whose first option says the default."""
+    has_default: bool
+    """Whether the driver has a default for the setting."""
     is_optional: bool
     """Whether the field may stay empty even without a default."""
+    is_needed: bool
+    """Whether the robot cannot connect until the field has a value."""
     options: tuple[Option, ...]
     is_given: bool
     """Whether the value is fixed because it was given when the server started."""
@@ -74,7 +78,7 @@ class FieldGroup:
     title: str
     fields: tuple[Field, ...]
     is_folded: bool
-    """Whether the fields are hidden at first; false if any field has an entered value."""
+    """Whether the fields are hidden at first; false if any field has or needs an entered value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +188,9 @@ def _interfaces(profile: Profile, chosen: str) -> tuple[Option, ...]:
 
 def _group(title: str, fields: list[Field]) -> FieldGroup:
     words = {CONNECTION: t("Connection"), FURTHER: t("Further settings")}
-    is_empty = not any(one.value or one.is_set or one.is_withheld for one in fields)
+    is_empty = not any(
+        one.value or one.is_set or one.is_withheld or one.is_needed for one in fields
+    )
     return FieldGroup(words.get(title, title), tuple(fields), title != CONNECTION and is_empty)
 
 
@@ -196,6 +202,7 @@ def _field(
     if is_given and not setting.is_secret:
         text = _text(given[setting.name])
     default = "" if setting.default is None else _text(setting.default)
+    is_set = is_given or (setting.name in kept.settings and setting.name not in withheld)
     kind, keys = _INPUTS.get(setting.type, ("text", ""))
     options: tuple[Option, ...] = ()
     if setting.is_secret:
@@ -213,10 +220,12 @@ def _field(
         keys=keys,
         value=text,
         default="" if options else default,
-        is_optional=not setting.is_required and not default,
+        has_default=bool(default) and not setting.is_secret,
+        is_optional=not setting.is_missing(setting.default) and not default,
+        is_needed=not is_set and setting.is_missing(setting.default),
         options=options,
         is_given=is_given,
-        is_set=is_given or (setting.name in kept.settings and setting.name not in withheld),
+        is_set=is_set,
         is_withheld=setting.name in withheld,
     )
 

@@ -25,6 +25,7 @@ import { part } from "../live/badge.js";
 import { causeWords } from "../core/connection_causes.js";
 import { button, made, ready } from "../core/dom.js";
 import { mark, t } from "../core/words.js";
+import { SettingChanges } from "./setting_changes.js";
 
 const KEPT_S = 365 * 24 * 3600;
 /** @type {Record<string, [string, string]>} */
@@ -44,10 +45,7 @@ const found = part(root, "[data-found]");
 const tester = form.querySelector("[data-test]");
 const plain = form.querySelector("[data-plain]");
 const hint = form.querySelector("[data-save-hint]");
-/** Secrets to delete. @type {Set<string>} */
-const forgotten = new Set();
-/** Saved values since the page was loaded. @type {Map<Element, string>} */
-const kept = new Map();
+const changes = new SettingChanges(form);
 let isBusy = false;
 
 /** @returns {Record<string, string | null>} */
@@ -57,7 +55,7 @@ function filled() {
   for (const field of form.querySelectorAll("[data-field] :is(input, select)")) {
     if (!(field instanceof HTMLInputElement || field instanceof HTMLSelectElement)) continue;
     if (field.disabled) continue;
-    const isUntouched = "secret" in field.dataset && field.value === "" && !forgotten.has(field.name);
+    const isUntouched = "secret" in field.dataset && field.value === "" && !changes.forgotten.has(field.name);
     settings[field.name] = isUntouched ? null : field.value;
   }
   return settings;
@@ -69,26 +67,10 @@ function chosen(name) {
   return field instanceof HTMLSelectElement ? field.value : "";
 }
 
-/** @returns {Map<Element, string>} */
-function values() {
-  const fields = [...form.elements].filter((one) => one instanceof HTMLInputElement || one instanceof HTMLSelectElement);
-  return new Map(fields.map((field) => [field, field.value]));
-}
-
-/** Return the value of a field when the page was loaded. @param {Element} field */
-function firstOf(field) {
-  if (field instanceof HTMLInputElement) return field.defaultValue;
-  const options = field instanceof HTMLSelectElement ? [...field.options] : [];
-  return (options.find((one) => one.defaultSelected) ?? options[0])?.value ?? "";
-}
-
-function isChanged() {
-  return forgotten.size > 0 || [...values()].some(([field, value]) => value !== (kept.get(field) ?? firstOf(field)));
-}
-
 /** Offer to save only what has changed; a test is possible at any time. */
 function offer() {
-  const hasChange = isChanged();
+  const hasChange = changes.unsaved().length > 0;
+  changes.show();
   if (plain instanceof HTMLButtonElement) {
     plain.disabled = isBusy;
     plain.hidden = !hasChange;
@@ -115,7 +97,7 @@ async function send({ test, anyway = false }) {
   tell(test ? t("testing the connection …") : t("saving …"));
   mistakes({});
   lines([]);
-  const [sent, hasChange] = [values(), isChanged()];
+  const [sent, hasChange] = [changes.values(), changes.unsaved().length > 0];
   try {
     /** @type {Answer} */
     const answer = await ask(root.dataset["post"] ?? "", {
@@ -145,7 +127,7 @@ async function send({ test, anyway = false }) {
 /** @param {string} text @param {string} [kind] */
 function tell(text, kind = "") {
   said.className = `urc-said ${kind}`.trim();
-  said.replaceChildren(text);
+  if (said.textContent !== text) said.textContent = text; // the same text is not read out again
 }
 
 function offerAnyway() {
@@ -155,20 +137,22 @@ function offerAnyway() {
   rows.after(more);
 }
 
-/** @param {Map<Element, string>} sent values of the fields; a field may have changed since */
+/** @param {Map<import("./setting_changes.js").Field, string>} sent a field may have changed since */
 function saved(sent) {
-  forgotten.clear();
-  for (const [field, value] of sent) kept.set(field, value);
+  changes.keep(sent);
   // The interface chosen here becomes the device's choice.
   const path = root.dataset["robot"] ?? "/";
   const name = encodeURIComponent(chosen("interface"));
   if (name) document.cookie = `urc-interface=${name}; path=${path}; max-age=${KEPT_S}; samesite=strict`;
-  for (const field of form.querySelectorAll("[data-secret]")) {
-    if (!(field instanceof HTMLInputElement)) continue;
-    if (field.value) field.placeholder = "••••••";
-    field.value = "";
-    kept.set(field, "");
-  }
+}
+
+/** Say how many changes are not saved, or what the robot still needs. */
+function count() {
+  const [n, missing] = [changes.unsaved().length, changes.missing()];
+  const words = n === 1 ? t("1 change is not saved")
+    : n > 1 ? t("{n} changes are not saved", { n })
+    : missing.length > 0 ? t("Not set yet: {names}.", { names: missing.join(", ") }) : "";
+  tell(words ? `◆ ${words}` : t("All changes are saved"));
 }
 
 /** @param {Record<string, string>} faults */
@@ -263,21 +247,25 @@ form.addEventListener("submit", (event) => {
   void send({ test: true });
 });
 form.addEventListener("input", outdate);
-form.addEventListener("input", offer);
+form.addEventListener("input", () => {
+  offer();
+  count();
+});
 plain?.addEventListener("click", () => void send({ test: false }));
 for (const one of form.querySelectorAll("[data-forget]")) {
   one.addEventListener("click", () => {
     if (!(one instanceof HTMLElement)) return;
-    const name = one.dataset["forget"] ?? "";
-    forgotten.add(name);
-    const field = form.elements.namedItem(name);
-    if (field instanceof HTMLInputElement) {
-      field.value = "";
-      field.placeholder = "";
-    }
+    changes.forget(one.dataset["forget"] ?? "");
     offer();
     tell(t("To be deleted when you save"));
   });
 }
+for (const one of form.querySelectorAll("[data-usual]")) {
+  one.addEventListener("click", () => {
+    const field = one.closest("[data-field]")?.querySelector("input, select");
+    if (field instanceof HTMLInputElement || field instanceof HTMLSelectElement) changes.useDefault(field);
+  });
+}
 ready(root);
 offer();
+if (tester) count();
