@@ -1,6 +1,7 @@
 """The menu in a real browser: states without a reload, order, filters, rows on a phone, sheets."""
 
 import asyncio
+import re
 
 import pytest
 from playwright.async_api import Page, Route, expect
@@ -83,6 +84,35 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
         await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
+
+
+async def test_a_card_says_its_state_or_its_action_in_large_letters(new_page: PageMaker) -> None:
+    """“Connect” says that nothing is connected; screen readers are told so too."""
+    robots = fleet(2)
+    async with running_dashboard(*robots) as address:
+        for size in ("phone", "desktop"):
+            menu, robot_page = await new_page(size=size), await new_page()
+            await menu.goto(address)
+            idle, used = (menu.locator(card(menu, number)) for number in (0, 1))
+            await expect(idle.get_by_role("link")).to_have_accessible_description(
+                re.compile("Not connected")
+            )
+            state = await idle.locator("[data-link]").bounding_box()
+            assert state is not None
+            assert state["width"] <= 1
+            await expect(idle.locator(".urc-robot-go")).to_have_text(re.compile("Connect"))
+            action = await idle.locator(".urc-robot-go").bounding_box()
+            assert action is not None
+            assert action["height"] >= (44 if size == "phone" else 40)
+            await robot_page.goto(f"{address}robots/salamandra-1/")
+            await expect(used.locator("[data-link]")).to_have_text("● Live", timeout=PATIENCE_MS)
+            state = await used.locator("[data-link]").bounding_box()
+            assert state is not None
+            assert state["width"] > 20
+            await expect(used.locator(".urc-robot-open")).to_be_visible()
+            await expect(used.locator(".urc-robot-connect")).to_be_hidden()
+            await robot_page.close()
+            await menu.close()
 
 
 async def test_a_card_says_what_kind_of_robot_it_is(new_page: PageMaker) -> None:

@@ -115,6 +115,22 @@ def test_only_the_emulated_robot_has_the_mark(client: TestClient) -> None:
     assert ">SIM</abbr>" not in client.get("/robots/puppet/").text
 
 
+def test_one_mark_serves_all_cards_if_all_robots_are_emulated(
+    robots: dict[str, FakeRobot], tmp_path: Path
+) -> None:
+    """A single card keeps its own mark."""
+    for names, on_cards in ((NAMES, False), (NAMES[:1], True)):
+        served = {
+            name: Robot(robots[name].profile, {}, robots[name].open, is_emulated=True)
+            for name in names
+        }
+        app = build_app(served, DashboardOptions(access=ACCESS, data=tmp_path))
+        with TestClient(app, base_url="http://localhost:8080", cookies=HERE) as client:
+            head, *cards = client.get("/").text.split("data-robot-card=")
+        assert [">SIM</abbr>" in card for card in cards] == [on_cards] * len(names)
+        assert (">SIM</abbr>" in head) is ("All robots are emulated" in head) is not on_cards
+
+
 @pytest.mark.anyio
 async def test_last_use_and_last_data_survive_a_restart(
     robots: dict[str, FakeRobot], tmp_path: Path

@@ -112,6 +112,8 @@ class MenuPage:
     """All tags of the robots, in alphabetical order."""
     states: object
     """States of the robots, in the format of the API call ``/api/v1/robots``."""
+    is_emulated: bool
+    """Whether all of several robots are emulated, so that one mark serves all cards."""
 
 
 def menu_page(
@@ -140,7 +142,8 @@ def menu_page(
         _broken(name, one, ways) for name, one in (broken or {}).items() if name not in robots
     ]
     tags = tuple(sorted({tag for card in cards for tag in card.tags}))
-    page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states)
+    is_emulated = len(cards) > 1 and all(card.is_emulated for card in cards)
+    page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states, is_emulated)
     return render("menu.html.j2", page)
 
 

@@ -56,6 +56,8 @@ function take(news) {
 function show(card, robot, nowS) {
   const link = linkWords(robot, nowS);
   card.dataset["state"] = link.state;
+  // “Connect” says enough about a robot that was never connected.
+  card.toggleAttribute("data-unseen", link.state === "off" && robot.seen_at === null);
   card.dataset["alarms"] = String(robot.alarms.count);
   card.dataset["worst"] = robot.alarms.worst;
   put(card, "[data-link]", link);
