@@ -22,6 +22,12 @@ from urc.transports.base import ByteStream, PeerClosed, TransportError, reset, u
 __all__ = ["ZenohRelay"]
 
 _PIECE_BYTES: Final = 65536
+GATHER_S: Final = 1 / 60
+"""Time for which the relay gathers the router's data after a small piece, in seconds: one display
+frame. Each piece wakes threads of the library and the event loop, which costs more than its bytes.
+"""
+GATHER_BYTES: Final = 8192
+"""Size of a small piece, in bytes. Larger ones belong to images, which must not wait."""
 _HAS_PATHS: Final = os.name == "posix"
 """Whether the library can connect to a socket in the file system."""
 
@@ -54,6 +60,9 @@ class ZenohRelay:
         """Why the network connection ended; "" if the library ended it."""
         self.heard_s = self._loop.time()
         """Time of the newest data from the router, on the event loop's clock."""
+        self.is_gathering = False
+        """Whether small pieces from the router are gathered. A session that is opening does not
+        gather, because a stop may wait for it."""
 
     def listen(self) -> str:
         """Open the private socket; return its Zenoh endpoint.
@@ -191,3 +200,5 @@ class ZenohRelay:
             data = await self._stream.read()
             self.heard_s = self._loop.time()
             await self._loop.sock_sendall(end, data)
+            if self.is_gathering and len(data) < GATHER_BYTES:
+                await asyncio.sleep(GATHER_S)

@@ -97,6 +97,7 @@ class ZenohSession:
             raise ConnectFailed(self._explain(timeout_s if is_late else None)) from fault
         except TransportError as fault:
             raise ConnectFailed(str(fault)) from fault
+        self._relay.is_gathering = True
         self._check = self._loop.call_later(_CHECK_S, self._look)
 
     async def publish(self, envelope: Envelope) -> None:

@@ -1,4 +1,4 @@
-"""The relay of a Zenoh connection reports every end, and waits for no router that takes nothing."""
+"""The relay of a Zenoh connection reports every end, waits for no deaf router, and gathers data."""
 
 import asyncio
 import socket
@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from urc.transports import zenoh_relay
 from urc.transports.base import PeerClosed
 from urc.transports.zenoh_relay import ZenohRelay
 
@@ -103,3 +104,87 @@ async def test_wait_ends_when_nothing_is_accepted_but_not_while_something_is() -
         assert relay.unsent() >= 4
     await relay.abort()
     await asyncio.wait_for(relay.passed(14, 60.0), WAIT_S)
+
+
+class Router:
+    """A connection that delivers what `pieces` holds, all at once, as a socket does."""
+
+    def __init__(self) -> None:
+        self.pieces: asyncio.Queue[bytes] = asyncio.Queue()
+        self.wrote: asyncio.Queue[bytes] = asyncio.Queue()
+
+    async def read(self) -> bytes:
+        data = await self.pieces.get()
+        while not self.pieces.empty():
+            data += self.pieces.get_nowait()
+        return data
+
+    async def write(self, data: bytes) -> None:
+        self.wrote.put_nowait(data)
+
+    async def close(self) -> None:
+        await self.abort()
+
+    async def abort(self) -> None:
+        """Close at once."""
+
+
+async def received(end: socket.socket, size: int, within_s: float = WAIT_S) -> bytes:
+    loop = asyncio.get_running_loop()
+    found = b""
+    async with asyncio.timeout(within_s):
+        while len(found) < size:
+            found += await loop.sock_recv(end, 65536)
+    return found
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_relay, "GATHER_S", 60.0)
+
+
+@pytest.mark.usefixtures("slow")
+async def test_small_pieces_are_gathered_and_large_ones_and_sent_data_do_not_wait() -> None:
+    router = Router()
+    relay = ZenohRelay(router, Ends())
+    with library(relay.listen()) as end:
+        end.setblocking(False)
+        relay.is_gathering = True
+        large = bytes(zenoh_relay.GATHER_BYTES)
+        for piece in (large, b"small"):
+            router.pieces.put_nowait(piece)
+            assert await received(end, len(piece)) == piece
+        router.pieces.put_nowait(b"later")
+        with pytest.raises(TimeoutError):
+            await received(end, 5, within_s=0.2)
+        end.send(b"a stop")
+        assert await asyncio.wait_for(router.wrote.get(), WAIT_S) == b"a stop"
+        await asyncio.wait_for(relay.passed(6, 60.0), WAIT_S)
+    await asyncio.wait_for(relay.close(), WAIT_S)
+
+
+@pytest.mark.usefixtures("slow")
+async def test_nothing_waits_while_the_session_opens() -> None:
+    """After a reconnection, a stop waits for the session."""
+    router = Router()
+    relay = ZenohRelay(router, Ends())
+    with library(relay.listen()) as end:
+        end.setblocking(False)
+        for piece in (b"one", b"two", b"six"):
+            router.pieces.put_nowait(piece)
+            assert await received(end, 3) == piece
+    await relay.close()
+
+
+async def test_gathered_pieces_arrive_whole_in_order_and_soon() -> None:
+    router = Router()
+    relay = ZenohRelay(router, Ends())
+    with library(relay.listen()) as end:
+        end.setblocking(False)
+        relay.is_gathering = True
+        sent = [bytes([number]) * 100 for number in range(40)]
+        for piece in sent:
+            router.pieces.put_nowait(piece)
+            await asyncio.sleep(0.001)
+        assert await received(end, 4000) == b"".join(sent)
+    await relay.close()
