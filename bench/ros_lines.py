@@ -3,6 +3,9 @@
 The robot publishes odometry, IMU data, a laser scan and two cameras (`bench.peers.ros_streams`). A
 page in Chromium shows all of them at full rate, or all except the cameras. The lines are measured
 in turn. The processor time is that of ``urc serve`` with its guard; the robot's does not count.
+
+On each line, a minimal program without engine and page (`bench.peers.ros_reader`) receives the same
+messages. Its processor time shows which part of URC's time belongs to the line and its library.
 """
 
 import asyncio
@@ -34,6 +37,10 @@ PERIOD_MS = 20.0
 """Goal of the page: the 95th percentile of the time between frames."""
 JSON, CBOR, FOXGLOVE, ZENOH = "rosbridge", "rosbridge with CBOR", "foxglove", "zenoh"
 LINES = {JSON: "rosbridge", CBOR: "rosbridge", FOXGLOVE: "foxglove", ZENOH: "zenoh"}
+MINIMAL = {f"{line}, minimal program": line for line in (JSON, FOXGLOVE, ZENOH)}
+VALUES, PICTURES = ("odom", "imu", "scan"), ("front", "rear")
+"""Topics that the page shows without and with the cameras."""
+READY_S = 40.0
 CAMERA_HZ = 15
 BYTES_WITH_CAMERAS, BYTES_WITHOUT, BYTES_OF_CBOR = 0.78, 0.5, 1.2
 """Goals for bytes, as ratios to rosbridge with JSON, and to rosbridge with CBOR."""
@@ -140,14 +147,35 @@ async def _round(folder: Path, look_s: float) -> dict[str, Costs]:
     for line, via in LINES.items():
         for what, of_lines in costs.items():
             with Program([sys.executable, "-m", "bench.peers.ros_streams", via]) as robot:
-                port = int(robot.wait_for("ready", 40.0)[1])
+                port = int(robot.wait_for("ready", READY_S)[1])
                 work = folder / f"{line}-{what}".replace(" ", "-")
                 work.mkdir()
                 file = work / "bench.yaml"
                 file.write_text(_profile(line, port, with_cameras=what == "cameras"), "utf-8")
                 with Server([file], work / "data") as server:
                     of_lines[line] = await _cost(robot, server, what, look_s)
+    for name, line in MINIMAL.items():
+        for what, of_lines in costs.items():
+            of_lines[name] = await _least(line, what, look_s)
     return costs
+
+
+async def _least(line: str, what: str, look_s: float) -> dict[str, float]:
+    """Return the figures of the minimal program on one line."""
+    topics = VALUES + (PICTURES if what == "cameras" else ())
+    with Program([sys.executable, "-m", "bench.peers.ros_streams", line]) as robot:
+        port = robot.wait_for("ready", READY_S)[1]
+        with Program([sys.executable, "-m", "bench.peers.ros_reader", line, port, *topics]) as one:
+            one.wait_for("ready", READY_S)
+            await asyncio.sleep(SETTLE_S)
+            before, bytes_before, began_s = cpu_s([one.pid]), _bytes(robot), time.monotonic()
+            await asyncio.sleep(look_s)
+            after, bytes_after = cpu_s([one.pid]), _bytes(robot)
+            passed_s = time.monotonic() - began_s
+    return {
+        "core": spent_s(before, after) / passed_s,
+        "bytes": (bytes_after - bytes_before) / passed_s,
+    }
 
 
 def _profile(line: str, port: int, *, with_cameras: bool) -> str:
@@ -200,7 +228,7 @@ def _bytes(robot: Program) -> int:
 def _figures(rows: Sequence[dict[str, Any]], what: str) -> list[Result]:
     """Print the medians of all rounds; return the results that have goals."""
     of_rows: list[Costs] = [row[what] for row in rows]
-    for line in LINES:
+    for line in (*LINES, *MINIMAL):
         middle = {
             name: statistics.median(costs[line][name] for costs in of_rows)
             for name in of_rows[0][line]
