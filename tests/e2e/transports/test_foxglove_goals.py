@@ -245,6 +245,25 @@ async def test_a_refused_cancellation_is_repeated_until_the_robot_ends_the_route
         await until(lambda: answer() == "answered")
 
 
+async def test_stop_is_unconfirmed_while_a_goal_of_another_program_goes_on(
+    rover: FoxgloveRobot,
+) -> None:
+    """The robot answers the cancellation with success, but it follows the goal."""
+    async with acting(rover) as (action, robot), connected(rover.port) as other:
+        foreign = await started(action, other)
+        action.hides = True
+        since = robot.session.goals.number
+        await robot.command("stop_route")
+        answer = partial(robot.session.goals.answer, "ros", "/follow_waypoints", since)
+        await until(lambda: len(action.cancels) >= 2)
+        assert action.running
+        assert answer() == "owed"
+        action.finish(*action.running, status=ABORTED)
+        await until(lambda: answer() == "answered")
+        with pytest.raises(CommandFailed, match="the action was aborted"):
+            await foreign
+
+
 async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -> None:
     async with connected(rover.port) as robot:
         with pytest.raises(CommandFailed, match="start it with include_hidden: true"):

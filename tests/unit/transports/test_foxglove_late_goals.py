@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from tests.unit.transports.test_foxglove_actions import ALL, CANCEL, DOCK, TEXTS, YES, Bridge, code
+from tests.unit.transports.foxglove_bridge import ALL, CANCEL, DOCK, TEXTS, YES, Bridge, code
 from urc.transports.ros.goals import LATE, UnfinishedGoals
 
 

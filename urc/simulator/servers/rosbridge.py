@@ -17,7 +17,8 @@ from urc.model.values import NOTHING
 from urc.simulator.servers.base import Endpoint, ServerContext
 from urc.simulator.servers.clients import ClientConnection, converse
 from urc.simulator.servers.websocket import MessageServer
-from urc.transports.ros.rosbridge_cancellations import CANCEL_GOAL, STATUS
+from urc.transports.ros.goal_status import STATUS
+from urc.transports.ros.rosbridge_cancellations import CANCEL_GOAL
 from urc.transports.ros.types import spelled
 
 __all__ = ["RosbridgeServer"]

@@ -30,6 +30,7 @@ from urc.transports.ros.foxglove_cancellations import (
     first_value,
 )
 from urc.transports.ros.foxglove_frames import ServiceReply, ServiceType
+from urc.transports.ros.foxglove_watches import StatusWatches
 from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
 
 __all__ = ["FEEDBACK", "ActionCalls", "FoxgloveActions", "feedback_of"]
@@ -67,13 +68,13 @@ class ActionCalls(CancelCalls, Protocol):
 class FoxgloveActions:
     """The goals and cancellations of one connection."""
 
-    def __init__(self, goals: UnfinishedGoals, calls: ActionCalls) -> None:
+    def __init__(self, goals: UnfinishedGoals, calls: ActionCalls, states: StatusWatches) -> None:
         """Create the state of a new connection; `goals` also contains those of earlier ones."""
         self._goals = goals
         self._calls = calls
         self._unsent: dict[str, str] = {}
         """Action of each goal that waits for its service or for the engine, keyed by goal id."""
-        self._cancellations = GoalCancellations(goals, calls)
+        self._cancellations = GoalCancellations(goals, calls, states)
 
     # -- starting
 

@@ -12,6 +12,12 @@ outlive the connection.
 A goal whose acceptance is still to come can be unknown, or even count as terminated. Such a reply
 proves nothing either: the goal is cancelled again at the moment of its acceptance.
 
+A reply to the zero id does not prove that the goals end. The library rclpy reports a refusal as
+success without goals, and a goal can take long to end. The cancellation of all goals is therefore
+answered only when the action's status then shows no active goal. An action that has never had a
+goal has no status. Its silence counts only if the bridge shows the topic, and the reply listed no
+goals.
+
 Sources: action_msgs/srv/CancelGoal; rcl_action and rclpy, handling of cancel requests.
 """
 
@@ -21,6 +27,8 @@ from typing import Any, Final, Protocol
 
 from urc.transports._faults import one_line
 from urc.transports.ros.foxglove_frames import ServiceReply, ServiceType
+from urc.transports.ros.foxglove_watches import StatusWatches
+from urc.transports.ros.goal_status import SILENT_S, STATUS
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
 
 __all__ = ["CANCEL_GOAL", "CancelCalls", "GoalCancellations", "first_value"]
@@ -67,21 +75,33 @@ class CancelCalls(Protocol):
 class _Attempt:
     """The newest call that cancels one goal, or all goals of an action."""
 
-    __slots__ = ("action", "call", "goal", "is_answered", "wait_s")
+    __slots__ = ("action", "call", "fault", "goal", "is_looking", "wait_s", "watch")
 
     def __init__(self, action: str, goal: str, wait_s: float) -> None:
         self.action, self.goal, self.wait_s = action, goal, wait_s
         self.call = 0
-        self.is_answered = False
+        self.fault = f"no reply within {wait_s:g} s"
+        """Why the attempt has not succeeded; "" if the reason is already told."""
+        self.watch: int | None = None
+        """Number of the watch of the goals' states, or None."""
+        self.is_looking = False
+        """Whether the latched status may still arrive."""
 
 
 class GoalCancellations:
     """The cancellations of one connection."""
 
-    def __init__(self, goals: UnfinishedGoals, calls: CancelCalls) -> None:
-        """Create the state of a new connection; `goals` contains what earlier ones left open."""
+    def __init__(self, goals: UnfinishedGoals, calls: CancelCalls, states: StatusWatches) -> None:
+        """Create the state of a new connection.
+
+        Args:
+            goals: record that contains what earlier connections left open.
+            calls: the session.
+            states: the session's watches of the states of goals.
+        """
         self._goals = goals
         self._calls = calls
+        self._states = states
         self._attempts: dict[tuple[str, str], _Attempt] = {}
         """Newest attempt of each unanswered cancellation, keyed by action and goal id."""
         self._awaited: dict[str, str] = {}
@@ -180,10 +200,13 @@ class GoalCancellations:
 
     def _again(self, attempt: _Attempt) -> None:
         """Repeat a cancellation, unless it was answered or sent again since."""
-        if self._attempts.get((attempt.action, attempt.goal)) is not attempt:
+        if not self._is_current(attempt):
             return
-        if not attempt.is_answered:
-            self._tell_failure(attempt, f"no reply within {attempt.wait_s:g} s")
+        if attempt.is_looking:  # for less than `SILENT_S`
+            self._calls.repeat(lambda: self._again(attempt), SILENT_S)
+            return
+        if attempt.fault:
+            self._calls.tell(f"the cancellation of {_what(attempt)} is repeated: {attempt.fault}")
         if self._is_open(attempt):
             self._cancel(attempt.action, attempt.goal, longer(attempt.wait_s))
         else:
@@ -198,10 +221,12 @@ class GoalCancellations:
         attempt = self._attempts.pop(key, None)
         if attempt is not None:
             self._calls.forget_call(attempt.call)
+            if attempt.watch is not None:
+                self._states.end(attempt.watch)
 
     def _answered(self, attempt: _Attempt, reply: ServiceReply | None, fault: str) -> None:
         """Handle the robot's reply to a cancellation."""
-        attempt.is_answered = True
+        attempt.fault = ""
         if attempt.goal == _ALL and reply is not None:
             self._goals.replied(attempt.action)
         code = -1 if reply is None else first_value(reply, "return_code")
@@ -211,8 +236,7 @@ class GoalCancellations:
             self._tell_refusal(attempt)
         elif attempt.goal == _ALL:
             if not self._is_followed(attempt.action, reply):
-                self._goals.settle(attempt.action)
-                self._drop((attempt.action, _ALL))
+                self._look(attempt, reply)
         elif reply is not None and code == _ACCEPTED and not _cancels(reply):
             self._tell_refusal(attempt)  # rclpy reports a refusal like this
         elif attempt.goal in self._awaited:
@@ -224,6 +248,48 @@ class GoalCancellations:
             self._drop((attempt.action, attempt.goal))
         elif code != _UNKNOWN:
             self.ended(attempt.goal)  # no result follows on this connection
+
+    def _look(self, attempt: _Attempt, reply: ServiceReply | None) -> None:
+        """Wait until the robot's own status shows that no goal of the action is active."""
+        attempt.fault = f"the bridge does not show {one_line(attempt.action + STATUS)[:_SHOWN]}"
+        attempt.is_looking = True
+        is_cancelling = reply is None or _cancels(reply)
+        watch = self._states.watch(
+            attempt.action, lambda is_active: self._seen(attempt, is_active=is_active)
+        )
+        if not self._is_current(attempt):  # a status that is already known has ended it
+            if watch is not None:
+                self._states.end(watch)
+            return
+        attempt.watch = watch
+        self._calls.repeat(lambda: self._silent(attempt, is_cancelling=is_cancelling), SILENT_S)
+
+    def _seen(self, attempt: _Attempt, *, is_active: bool) -> None:
+        """Handle a status of the action after the robot's reply."""
+        if not self._is_current(attempt):
+            return
+        attempt.is_looking = False
+        attempt.fault = "the robot still follows a goal"
+        if not is_active:
+            self._settle(attempt)
+
+    def _silent(self, attempt: _Attempt, *, is_cancelling: bool) -> None:
+        """Take the silence of an action that has never had a goal as its end."""
+        if not self._is_current(attempt) or not attempt.is_looking:
+            return
+        attempt.is_looking = False
+        is_known = attempt.watch is not None and self._states.is_silent(attempt.watch)
+        if is_known and not is_cancelling:
+            self._settle(attempt)
+
+    def _settle(self, attempt: _Attempt) -> None:
+        """End the cancellation of all goals, unless the robot may still accept a goal."""
+        if attempt.action not in self._awaited.values():
+            self._goals.settle(attempt.action)
+            self._drop((attempt.action, _ALL))
+
+    def _is_current(self, attempt: _Attempt) -> bool:
+        return self._attempts.get((attempt.action, attempt.goal)) is attempt
 
     def _is_followed(self, action: str, reply: ServiceReply | None) -> bool:
         """Return whether the robot may follow a goal despite its reply to the zero id."""
@@ -238,7 +304,7 @@ class GoalCancellations:
         self._calls.tell(f"the robot refused to cancel {_what(attempt)}; URC asks again")
 
     def _tell_failure(self, attempt: _Attempt, fault: str) -> None:
-        self._calls.tell(f"the cancellation of {_what(attempt)} failed and is repeated: {fault}")
+        self._calls.tell(f"the cancellation of {_what(attempt)} is repeated: {fault}")
 
 
 def _what(attempt: _Attempt) -> str:

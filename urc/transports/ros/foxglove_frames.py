@@ -23,6 +23,7 @@ __all__ = [
     "call_frame",
     "channel_of",
     "encode_operation",
+    "listed",
     "publish_frame",
     "service_of",
 ]
@@ -161,6 +162,12 @@ def call_frame(service: int, call: int, encoding: str, data: bytes) -> bytes:
     """Return the frame for a service call."""
     name = encoding.encode()
     return struct.pack("<BIII", 2, service, call, len(name)) + name + data
+
+
+def listed(said: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    """Return the objects in one list of an operation; [] without a list."""
+    found = said.get(name)
+    return [one for one in found if isinstance(one, Mapping)] if isinstance(found, list) else []
 
 
 def _number(said: Mapping[str, Any]) -> int | None:

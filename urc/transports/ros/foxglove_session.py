@@ -1,7 +1,6 @@
 """The state of one open Foxglove protocol connection: channels, subscriptions, calls.
 
-The session does no I/O. The session writes frames to a list, and the transport sends these frames.
-Each object serves a single connection.
+The session does no I/O: the transport sends its frames. Each object serves a single connection.
 
 The robot announces its topics as channels, which can appear and disappear. The session subscribes
 only to the driver's topics. The bridge sends every message at the full rate, so the session drops
@@ -12,9 +11,8 @@ messages on as bytes, preceded by the definition of the topic's type
 Goals use the hidden services of actions (`urc.transports.ros.foxglove_actions`). Of a connection's
 state, only the unfinished goals and the published topics are carried over to the next connection.
 
-The protocol provides the parameters and the list of topics. The session uses both to answer the
-corresponding rosapi services itself, so the same document also works with rosbridge
-(`urc.transports.ros.rosapi_answers`).
+The protocol provides parameters and topics. The session uses both to answer the rosapi services
+itself, so the same document also works with rosbridge (`urc.transports.ros.rosapi_answers`).
 """
 
 import logging
@@ -39,11 +37,13 @@ from urc.transports.ros.foxglove_frames import (
     call_frame,
     channel_of,
     encode_operation,
+    listed,
     publish_frame,
     service_of,
 )
 from urc.transports.ros.foxglove_publishing import PublishedType, message_data, message_json
-from urc.transports.ros.foxglove_topics import FoxgloveTopics, TopicWish
+from urc.transports.ros.foxglove_topics import DrivenChannel, FoxgloveTopics, TopicWish
+from urc.transports.ros.foxglove_watches import StatusWatches
 from urc.transports.ros.goals import UnfinishedGoals
 from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
@@ -72,20 +72,6 @@ PARAMETER: Final = "parameter:"
 """Prefix of a topic that represents a parameter, such as ``parameter:/driver.rate``."""
 
 log = logging.getLogger(__name__)
-
-
-class _Subscription:
-    """A subscribed topic, with the earliest time of its next message."""
-
-    __slots__ = ("channel", "due_s", "late", "number", "received", "wish")
-
-    def __init__(self, wish: TopicWish, channel: AdvertisedChannel, number: int) -> None:
-        self.wish, self.channel, self.number = wish, channel, number
-        self.due_s = float("-inf")
-        self.received = 0
-        """Number of received messages."""
-        self.late: Envelope | None = None
-        """Newest message that arrived too soon and must be delivered later, or None."""
 
 
 class FoxgloveSession:
@@ -127,8 +113,8 @@ class FoxgloveSession:
         self._reader = FrameReader()
         self._frames: list[tuple[bytes, bool]] = []
         self._channels: dict[int, AdvertisedChannel] = {}
-        self._subscriptions: dict[int, _Subscription] = {}
-        self._topics: dict[str, _Subscription] = {}
+        self._subscriptions: dict[int, DrivenChannel] = {}
+        self._topics: dict[str, DrivenChannel] = {}
         self._paused: set[str] = set()
         """Topics that the driver does not need at present."""
         self._services: dict[str, ServiceType] = {}
@@ -139,14 +125,14 @@ class FoxgloveSession:
         """Goal of each pending call for a result, keyed by the call's number."""
         self._flush = flush
         self._rosapi = RosapiAnswers(self)
-        self._actions = FoxgloveActions(UnfinishedGoals() if goals is None else goals, self)
+        self._states = StatusWatches(self)
+        self._actions = FoxgloveActions(goals or UnfinishedGoals(), self, self._states)
         self._graph_topics = FoxgloveTopics()
         self._published_s = float("-inf")
-        self._number = 0
+        self._number = self._bad = 0
         self._time = RobotTime(clock_only)
         self._told: set[str] = set()
         self._retries: Counter[str] = Counter()
-        self._bad = 0
         self.capabilities: frozenset[str] = frozenset()
         self.encodings: tuple[str, ...] = ()
         self.is_greeted = False
@@ -217,7 +203,7 @@ class FoxgloveSession:
             self._op("getParameters", parameterNames=names, id="first")
 
     def _advertise(self, said: Mapping[str, Any]) -> None:
-        for one in _listed(said, "channels"):
+        for one in listed(said, "channels"):
             try:
                 channel = channel_of(one)
             except BadOperation as problem:
@@ -259,7 +245,7 @@ class FoxgloveSession:
             if topic in self._topics:
                 continue
             self._number += 1
-            one = _Subscription(self._wishes[topic], channel, self._number)
+            one = DrivenChannel(self._wishes[topic], channel, self._number)
             self._topics[topic] = self._subscriptions[one.number] = one
             self._define(channel)
             new.append({"id": one.number, "channelId": channel.id})
@@ -285,8 +271,11 @@ class FoxgloveSession:
     def _message(self, said: MessageData) -> None:
         one = self._subscriptions.get(said.subscription)
         if one is None:
+            self._states.arrived(said.subscription, said.data)
             return
         one.received += 1
+        if one.is_status:
+            self._states.driver_arrived(one.number, one.wish.topic, said.data)
         self._take_time(said.time_ns)
         attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
         envelope = Envelope("message", attributes, said.data)
@@ -315,7 +304,7 @@ class FoxgloveSession:
         if stepped is not None:
             self.queue.answer(stepped)
 
-    def _deliver_late(self, one: _Subscription) -> None:
+    def _deliver_late(self, one: DrivenChannel) -> None:
         envelope, one.late = one.late, None
         if envelope is None or self._subscriptions.get(one.number) is not one:
             return
@@ -326,7 +315,7 @@ class FoxgloveSession:
     # -- services and parameters
 
     def _advertise_services(self, said: Mapping[str, Any]) -> None:
-        for one in _listed(said, "services"):
+        for one in listed(said, "services"):
             service = service_of(one, self.encodings)
             if service.name in self._services or len(self._services) < MAX_CHANNELS:
                 self._services[service.name] = service
@@ -374,7 +363,9 @@ class FoxgloveSession:
     def _take_parameters(self, said: Mapping[str, Any]) -> None:
         """Answer a query for parameters, and deliver parameters that the driver subscribes to."""
         found = {
-            one["name"]: one.get("value") for one in _listed(said, "parameters") if _named(one)
+            one["name"]: one.get("value")
+            for one in listed(said, "parameters")
+            if isinstance(one.get("name"), str)
         }
         self._rosapi.found(str(said.get("id")), found)
         for name, value in found.items():
@@ -412,6 +403,7 @@ class FoxgloveSession:
         refuses a client that subscribes immediately. The refusal is text that contains the channel
         number.
         """
+        self._states.refuse(channels)
         for one in list(self._topics.values()):
             topic, is_refused = one.wish.topic, one.channel.id in channels and not one.received
             if is_refused and self._retries[topic] < MAX_RETRIES:
@@ -571,6 +563,21 @@ class FoxgloveSession:
 
         self._call_at(self._clock() + after_s, run)
 
+    # -- the parts that the states of goals need; see `WatchCalls`
+
+    def channel(self, topic: str) -> AdvertisedChannel | None:
+        """Return the first channel of a topic, or None."""
+        return next((one for one in self._channels.values() if one.topic == topic), None)
+
+    def subscription(self, topic: str) -> int | None:
+        """Return the number of the driver's own subscription to a topic, or None."""
+        return self._topics[topic].number if topic in self._topics else None
+
+    def is_published(self, topic: str) -> bool:
+        """Return whether a node publishes a topic; true if the bridge reports no nodes."""
+        nodes = self._graph_topics.publishers_of(topic)
+        return bool(nodes) or "connectionGraph" not in self.capabilities
+
     # -- the parts that parameters need; see `RosapiCalls`
 
     def topics(self) -> dict[str, str]:
@@ -583,17 +590,9 @@ class FoxgloveSession:
         return self._number
 
     def operate(self, name: str, **fields: object) -> None:
-        """Write an operation of the protocol."""
+        """Write an operation of the protocol, which is sent soon."""
         self._op(name, **fields)
+        self._flush()
 
     def _op(self, name: str, **fields: object) -> None:
         self._frames.append((encode_operation({"op": name, **fields}), True))
-
-
-def _listed(said: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
-    found = said.get(name)
-    return [one for one in found if isinstance(one, Mapping)] if isinstance(found, list) else []
-
-
-def _named(one: Mapping[str, Any]) -> bool:
-    return isinstance(one.get("name"), str)

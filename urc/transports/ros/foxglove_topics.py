@@ -10,10 +10,11 @@ from typing import Any, Final, NamedTuple
 
 from urc.model.payload import Envelope
 from urc.transports.ros.foxglove_frames import AdvertisedChannel
+from urc.transports.ros.goal_status import STATUS
 from urc.transports.ros.graph import version_of
 from urc.transports.ros.topic_list import MAX_TOPICS, TopicRow, answer_of, short_type, wanted_of
 
-__all__ = ["FoxgloveTopics", "TopicWish"]
+__all__ = ["FoxgloveTopics", "DrivenChannel", "TopicWish"]
 
 MAX_GRAPH: Final = 4096
 """Maximum number of topics with known publishers, and of topics with known subscribers."""
@@ -29,6 +30,21 @@ class TopicWish(NamedTuple):
     topic: str
     type: str = ""
     throttle_s: float = 0.0
+
+
+class DrivenChannel:
+    """A subscribed topic, with the earliest time of its next message."""
+
+    __slots__ = ("channel", "due_s", "is_status", "late", "number", "received", "wish")
+
+    def __init__(self, wish: TopicWish, channel: AdvertisedChannel, number: int) -> None:
+        self.wish, self.channel, self.number = wish, channel, number
+        self.is_status = wish.topic.endswith(STATUS)
+        self.due_s = float("-inf")
+        self.received = 0
+        """Number of received messages."""
+        self.late: Envelope | None = None
+        """Newest message that arrived too soon and must be delivered later, or None."""
 
 
 class FoxgloveTopics:
@@ -55,6 +71,10 @@ class FoxgloveTopics:
     def subscribers_of(self, topic: str) -> tuple[str, ...] | None:
         """Return the nodes that subscribe to a topic; None if the nodes are unknown."""
         return self._subscribers.get(topic, ()) if self.is_known else None
+
+    def publishers_of(self, topic: str) -> tuple[str, ...]:
+        """Return the nodes that publish a topic, as far as they are known."""
+        return self._publishers.get(topic, ())
 
     def announced(self, topic: str, kind: str, channels: Iterable[AdvertisedChannel]) -> None:
         """Record that URC publishes a topic; `channels` are the robot's channels before."""

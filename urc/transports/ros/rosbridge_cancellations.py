@@ -31,27 +31,20 @@ from typing import Any, Final, Protocol
 from urc.model.payload import Payload
 from urc.transports._faults import one_line
 from urc.transports.base import TransportError
+from urc.transports.ros.goal_status import SILENT_S, STATUS, STATUS_TYPE, shows_active
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, longer
 from urc.transports.ros.rosbridge_operations import BadOperation, OperationReader, encode_operation
 
-__all__ = ["CANCEL_GOAL", "STATUS", "CancelWire", "ActionCancellations"]
+__all__ = ["CANCEL_GOAL", "CancelWire", "ActionCancellations"]
 
 CANCEL_GOAL: Final = "/_action/cancel_goal"
 """End of the name of the service that cancels goals."""
-STATUS: Final = "/_action/status"
-"""End of the name of the topic with the states of an action's goals; the newest message is latched.
-"""
 ATTEMPT_S: Final = 5.0
 """Time limit of one attempt, from connecting to the end of all goals, in seconds."""
-SILENT_S: Final = 1.0
-"""Time within which the latched status arrives if there is one, in seconds."""
 MAX_AT_ONCE: Final = 8
 """Maximum number of simultaneous attempts; each one needs a connection."""
 _SHOWN: Final = 80
 _REJECTED, _TERMINATED = 1, 3
-_STATUS_TYPE: Final = "action_msgs/msg/GoalStatusArray"
-_ACTIVE: Final = (1, 2, 3)
-"""States of accepted, executing and canceling goals (action_msgs/msg/GoalStatus)."""
 _GOES_ON: Final = "the robot still follows a goal"
 
 
@@ -219,14 +212,14 @@ async def _rest(bridge: _Bridge, topic: str, *, is_cancelling: bool) -> str:
         is_cancelling: whether the robot has listed goals that it now cancels. Such an action has a
             status.
     """
-    await bridge.subscribe(topic, _STATUS_TYPE)
+    await bridge.subscribe(topic, STATUS_TYPE)
     try:
         async with asyncio.timeout(SILENT_S):
             said = await bridge.message(topic)
     except TimeoutError:
         is_shown = not is_cancelling and await _is_published(bridge, topic)
         return "" if is_shown else f"the bridge does not show {one_line(topic)[:_SHOWN]}"
-    while _is_active(said):
+    while shows_active(said):
         said = await bridge.message(topic)
     return ""
 
@@ -238,15 +231,6 @@ async def _is_published(bridge: _Bridge, topic: str) -> bool:
     if said.get("result") is False or not isinstance(values, Mapping):
         return False
     return bool(values.get("publishers"))
-
-
-def _is_active(status: Any) -> bool:
-    """Return whether a status shows an active goal; an invalid status does not show the end."""
-    listed = status.get("status_list") if isinstance(status, Mapping) else None
-    if not isinstance(listed, list):
-        return True
-    states = [one.get("status") if isinstance(one, Mapping) else None for one in listed]
-    return any(not isinstance(one, int) or one in _ACTIVE for one in states)
 
 
 def _outcome(reply: Mapping[str, Any]) -> tuple[str, bool]:

@@ -47,6 +47,8 @@ class FoxgloveRobot(ServerListener):
         self.heard: list[tuple[str, bytes]] = []
         self.parameters = {"/driver.rate": 10, "/driver.name": "base"}
         self._topics: dict[int, str] = {}
+        self._latched: dict[str, bytes] = {}
+        """Newest message of each latched topic, which a new subscriber receives."""
         self._channels: dict[str, Channel] = {}
         self._lock = threading.Lock()
         self.server = foxglove.start_server(
@@ -77,6 +79,19 @@ class FoxgloveRobot(ServerListener):
             )
         data = message if isinstance(message, bytes) else bytes(ROS2.serialize_cdr(message, name))
         channel.log(data, log_time=time.time_ns())
+
+    def offer_topic(self, topic: str, name: str, text: str) -> Channel:
+        """Announce a topic without a message."""
+        schema = Schema(name=name, encoding="ros2msg", data=text.encode())
+        channel = self._channels[topic] = Channel(
+            topic, message_encoding="cdr", schema=schema, context=self.context
+        )
+        return channel
+
+    def latch(self, topic: str, data: bytes) -> None:
+        """Publish a message on an announced topic; later subscribers receive it, too."""
+        self._latched[topic] = data
+        self._channels[topic].log(data, log_time=time.time_ns())
 
     def publish_ros1(self, topic: str, name: str, message: Any, text: str | None = None) -> None:
         """Publish a message of ROS 1, as a bridge of ROS 1 does."""
@@ -112,6 +127,11 @@ class FoxgloveRobot(ServerListener):
 
     def on_subscribe(self, client: Any, channel: Any) -> None:
         self.subscribed.append(channel.topic)
+        data = self._latched.get(channel.topic)
+        if data is not None:  # the server subscribes after this callback
+            late = threading.Timer(0.05, lambda: self.latch(channel.topic, data))
+            late.daemon = True
+            late.start()
 
     def on_client_advertise(self, client: Any, channel: Any) -> None:
         self._topics[channel.id] = channel.topic

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from foxglove import Channel, MessageSchema, Schema, Service, ServiceRequest, ServiceSchema
+from foxglove.websocket import ConnectionGraph
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
@@ -18,7 +19,8 @@ from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 __all__ = ["ACCEPTED", "REJECTED", "TERMINATED", "UNKNOWN", "RouteAction", "Goal"]
 
 ACCEPTED, REJECTED, UNKNOWN, TERMINATED = range(4)
-SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
+EXECUTING, SUCCEEDED, CANCELED, ABORTED = 2, 4, 5, 6
+STATUS_TYPE: Final = "action_msgs/msg/GoalStatusArray"
 WAIT_S = 60.0
 KIND: Final = "nav2_msgs/action/FollowWaypoints"
 PARTS: Final = {
@@ -97,8 +99,15 @@ class RouteAction:
         self.missed: list[int] = []
         self.cancels: list[tuple[str, int]] = []
         """Goal id and return code of each cancellation; the id of all goals is zero."""
+        self.hides = False
+        """Whether the robot reports success for cancellations, but ends no goal, as rclpy can."""
         self.forgets = 0
         """Number of further cancellations by id that arrive before their goal, as after a delay."""
+        text = str(STORE.generate_msgdef(STATUS_TYPE, ros_version=2)[0])
+        robot.offer_topic(f"{name}/_action/status", STATUS_TYPE, text)
+        graph = ConnectionGraph()
+        graph.set_published_topic(f"{name}/_action/status", ["/robot"])
+        robot.server.publish_connection_graph(graph)
         self._offer("send_goal", KIND + "_SendGoal", self._send_goal)
         self._offer("get_result", KIND + "_GetResult", self._get_result)
         self._offer("cancel_goal", "action_msgs/srv/CancelGoal", self._cancel_goal)
@@ -110,12 +119,29 @@ class RouteAction:
     def finish(self, goal: str, status: int = SUCCEEDED) -> None:
         """End a goal."""
         self.goals[goal].status = status
+        self._publish_status()
         self.goals[goal].ended.set()
 
     def end_all(self) -> None:
         """End all goals, so that no thread waits."""
         for goal in self.running:
             self.finish(goal, ABORTED)
+
+    def _publish_status(self) -> None:
+        """Latch the states of all goals, as the server of an action does."""
+        kinds = STORE.types
+        stamp = kinds["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
+        listed = [
+            kinds["action_msgs/msg/GoalStatus"](
+                goal_info=kinds["action_msgs/msg/GoalInfo"](
+                    goal_id=_uuid(bytes.fromhex(one)), stamp=stamp
+                ),
+                status=goal.status or EXECUTING,
+            )
+            for one, goal in list(self.goals.items())
+        ]
+        message = kinds[STATUS_TYPE](status_list=listed)
+        self._robot.latch(f"{self._name}/_action/status", _packed(message, STATUS_TYPE))
 
     def publish_feedback(self, waypoint: int) -> None:
         """Publish the progress of the route."""
@@ -141,6 +167,7 @@ class RouteAction:
         request = STORE.deserialize_cdr(data, name)
         if self.accepts:
             self.goals[bytes(request.goal_id.uuid).hex()] = Goal(request.goal)
+            self._publish_status()
         stamp = STORE.types["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
         name = "FollowWaypoints_SendGoal_Response"
         return _packed(_made(name, accepted=self.accepts, stamp=stamp), f"nav2_msgs/msg/{name}")
@@ -176,6 +203,8 @@ class RouteAction:
             code = UNKNOWN if known is None else ACCEPTED if ending else TERMINATED
         if self.refuses:
             code, ending = REJECTED, []
+        if self.hides:
+            code, ending = ACCEPTED, []
         self.cancels.append((wanted, code))
         for goal in ending:
             self.finish(goal, CANCELED)
