@@ -20,6 +20,7 @@ from urc.patterns import Pattern
 __all__ = [
     "NUMBERED",
     "RESTARTED",
+    "UNKNOWN_END",
     "Collect",
     "Count",
     "CountedFrame",
@@ -53,6 +54,8 @@ class Envelope(NamedTuple):
 RESTARTED: Final = "restarted"
 """The verb of an envelope that a ROS transport makes if the robot's clock, which may be simulated,
 went back. The body is one line of text about it; "" if the step is not worth a line."""
+UNKNOWN_END: Final = "is_end_unknown"
+"""Attribute of a response that reports a failure: true if the robot may still follow the goal."""
 NUMBERED: Final = frozenset(("call", "goal", "request", "get"))
 """Verbs of requests. The ``response`` to a request has the request's ``id``."""
 

@@ -264,6 +264,18 @@ async def test_stop_is_unconfirmed_while_a_goal_of_another_program_goes_on(
             await foreign
 
 
+async def test_a_goal_whose_call_fails_is_not_refused(rover: FoxgloveRobot) -> None:
+    """The robot follows the goal, but the bridge reports a failure of the call."""
+    async with acting(rover) as (action, robot):
+        action.breaks = True
+        with pytest.raises(CommandFailed) as caught:
+            await robot.command("follow", **ROUTE)
+        assert caught.value.code == "timed-out"
+        assert action.running
+        await robot.command("stop_route")
+        await until(lambda: not action.running)
+
+
 async def test_a_bridge_without_hidden_services_is_named(rover: FoxgloveRobot) -> None:
     async with connected(rover.port) as robot:
         with pytest.raises(CommandFailed, match="start it with include_hidden: true"):

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from urc.client.local import load
-from urc.model.payload import Envelope
+from urc.model.payload import UNKNOWN_END, Envelope
 from urc.protocol.engine import Engine
 from urc.protocol.events import Event, Failed, Replied, Request, Send
 
@@ -47,7 +47,7 @@ class Told:
         request = Request(1, command, on_goal=lambda *goal: self.goals.append(goal))
         self.events: list[Event] = engine.command(request, 0.0) + engine.tick(0.0)
 
-    def reply(self, action: str, *, is_ok: bool = True) -> None:
+    def reply(self, action: str, *, is_ok: bool = True, is_end_unknown: bool = False) -> None:
         """Answer the newest goal of an action as a bridge does."""
         sent = [one.data for one in self.events if isinstance(one, Send)]
         (goal, *_) = [
@@ -56,6 +56,8 @@ class Told:
             if isinstance(one, Envelope) and one.attributes.get("action") == action
         ]
         said = {"id": goal.attributes["id"], "ok": is_ok, "reason": "" if is_ok else "no way"}
+        if is_end_unknown:
+            said[UNKNOWN_END] = True
         self.events += self.engine.receive("ros", Envelope("response", said, {"done": True}), 0.1)
 
     @property
@@ -125,3 +127,13 @@ def test_a_result_after_the_time_limit_of_a_command_is_told(engine: Engine) -> N
     assert (leave.goals, leave.codes) == ([("/undock", False)], ["timed-out"])
     leave.reply("/undock")
     assert leave.goals == [("/undock", False), ("/undock", True)]
+
+
+@pytest.mark.parametrize("command", ["undock", "leave"])
+def test_a_goal_whose_end_is_unknown_is_not_refused(engine: Engine, command: str) -> None:
+    """The bridge reports that it cannot say how the goal ends, so the robot may follow it."""
+    told = Told(engine, command)
+    told.reply("/undock", is_ok=False, is_end_unknown=True)
+    assert told.goals == [("/undock", False)]
+    (failed,) = [one for one in told.events if isinstance(one, Failed)]
+    assert (failed.code, "no way" in failed.message) == ("timed-out", True)

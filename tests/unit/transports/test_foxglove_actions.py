@@ -11,13 +11,14 @@ from tests.unit.transports.foxglove_bridge import (
     CANCEL,
     DOCK,
     NO,
+    TEXTS,
     YES,
     Bridge,
     answer,
     code,
 )
 from urc.model.driver import STOPPED
-from urc.model.payload import Envelope
+from urc.model.payload import UNKNOWN_END, Envelope
 from urc.transports.base import NOTICE
 from urc.transports.ros.foxglove_actions import HIDDEN
 from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
@@ -314,6 +315,7 @@ def test_a_result_ends_the_goal(status: int, reason: str | None) -> None:
     answer = bridge.codec.received(raw).envelope
     assert answer is not None
     assert answer.attributes["ok"] == (reason is None)
+    assert (UNKNOWN_END in answer.attributes) == (status == 9)
     assert answer.attributes.get("reason") == reason
     assert answer.body == {"way": 2.5}
     assert goals.cancel("/dock") == []
@@ -326,6 +328,7 @@ def test_a_rejected_goal_is_not_kept() -> None:
     bridge.reply(call, NO)
     (answer,) = bridge.told()
     assert answer.attributes["reason"] == "the action was rejected"
+    assert UNKNOWN_END not in answer.attributes
     assert goals.cancel("/dock") == []
 
 
@@ -336,6 +339,35 @@ def test_a_goal_without_an_answer_is_kept_for_stop() -> None:
     bridge.hear({"op": "serviceCallFailure", "callId": call, "message": "timed out"})
     (answer,) = bridge.told()
     assert answer.attributes["reason"] == "timed out"
+    assert answer.attributes[UNKNOWN_END] is True
+    assert goals.cancel("/dock") == [goal]
+
+
+@pytest.mark.parametrize("case", ["no service", "a failed call", "an unreadable type"])
+def test_the_end_of_an_accepted_goal_without_a_result_is_unknown(
+    case: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if case == "an unreadable type":
+        monkeypatch.setitem(TEXTS, "get_result", ("no/Such thing", "int8 status"))
+    goals = UnfinishedGoals()
+    bridge = Bridge(goals).offer()
+    call, goal = bridge.start()
+    if case == "no service":
+        bridge.hear({"op": "unadvertiseServices", "serviceIds": [11]})
+    bridge.reply(call, YES)
+    (told,) = bridge.told()
+    found = bridge.codec.received(told)
+    if case == "a failed call":
+        assert found.reply is not None
+        bridge.session.perform(found.reply)
+        ((_, call, _),) = bridge.sent()
+        bridge.hear({"op": "serviceCallFailure", "callId": call, "message": "timed out"})
+        (told,) = bridge.told()
+        found = bridge.codec.received(told)
+    answer = found.envelope
+    assert answer is not None
+    assert (answer.attributes["id"], answer.attributes["ok"]) == (7, False)
+    assert answer.attributes[UNKNOWN_END] is True
     assert goals.cancel("/dock") == [goal]
 
 

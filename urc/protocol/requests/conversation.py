@@ -19,7 +19,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 from urc.model.driver import TransportSpec
-from urc.model.payload import CountedFrame, Envelope, Numbered, Payload, size_of
+from urc.model.payload import UNKNOWN_END, CountedFrame, Envelope, Numbered, Payload, size_of
 from urc.model.values import Sample
 from urc.protocol.events import MotionRefused, NumbersUsed, Open, Send, Violation
 from urc.protocol.forms.http_head import is_redirect
@@ -422,9 +422,10 @@ class Conversation(Connection):
         number, reason = attributes.get("id"), ""
         if not attributes.get("ok", True):
             reason = str(attributes.get("reason") or "the robot refused")
+        code = "timed-out" if attributes.get(UNKNOWN_END) is True else "refused"
         asker = self._askers.pop(number, None)
         if asker is not None and asker.goal is not None:
-            asker.goal.ended()  # even if its request has already timed out
+            asker.goal.ended(code)  # even if its request has already timed out
         pending = self._pending_replies.numbered(number)
         if pending is None:
             if number is None and self.held.is_listening(now):
@@ -435,7 +436,7 @@ class Conversation(Connection):
             return self.receiver.answered(asker.owner, frame, reason, now)
         if reason and pending.expectation.answer.takes_redirects and is_redirect(frame):
             reason = ""
-        offer = pending.refused(frame, reason) if reason else pending.answer(frame)
+        offer = pending.refused(frame, reason, code) if reason else pending.answer(frame)
         return self._answer(pending, offer, frame, now)
 
     def _motion_response(
@@ -522,7 +523,7 @@ class Conversation(Connection):
             text = f"the robot requested {exchange.ask.label} again after {times} transmissions"
             outcome = ExchangeOutcome("refused", text)
         elif offer.fields is None:
-            outcome = ExchangeOutcome("refused", self.receiver.secrets.hide(offer.refusal))
+            outcome = ExchangeOutcome(offer.code, self.receiver.secrets.hide(offer.refusal))
         else:
             told, samples = self.receiver.samples(
                 pending.expectation.answer.matcher, offer.fields, now

@@ -67,10 +67,12 @@ class PendingReply:
             return MatchResult(refusal=f"the reply does not match the declaration: {shown(frame)}")
         return offer
 
-    def refused(self, frame: Frame, reason: str) -> MatchResult:
-        """Return the robot's refusal, with the driver's text if declared."""
+    def refused(self, frame: Frame, reason: str, code: str) -> MatchResult:
+        """Return a refusal with a failure code, and with the driver's text if declared."""
         offer = self.expectation.offer(frame)
-        return offer if offer is not None and offer.refusal else MatchResult(refusal=reason)
+        if offer is None or not offer.refusal:
+            offer = MatchResult(refusal=reason)
+        return offer._replace(code=code)
 
     def offer(self, frame: Frame, *, is_message: bool = False) -> MatchResult | None:
         """Return the match result for a frame; None if the frame answers another request.

@@ -104,6 +104,8 @@ class MatchResult(NamedTuple):
     """Fields of a complete reply; None for an incomplete reply or a refusal."""
     refusal: str = ""
     """The robot's refusal, as a human-readable message; "" means no refusal."""
+    code: str = "refused"
+    """Failure code of a refusal."""
     told: tuple[Matcher, Fields] | None = None
     """Matcher and fields of a provisional or error reply, for updating signals."""
     aside: Aside | None = None

@@ -33,7 +33,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final, NamedTuple, cast
 
 from urc.model.driver import STOPPED
-from urc.model.payload import Envelope, Payload
+from urc.model.payload import UNKNOWN_END, Envelope, Payload
 from urc.problems import UrcError, printable
 from urc.protocol.flatbuffer.read import FlatbufferReader
 from urc.protocol.flatbuffer.schema import parse_schema as parse_binary_schema
@@ -372,6 +372,8 @@ class TopicCodec:
             return Received(reply=self._call(Envelope("call", said, body)))
         except (BadDefinition, Unwritable) as fault:
             attributes = {"id": said.get("id"), "ok": False, "reason": str(fault)}
+            if "result_of" in said:  # the robot has accepted the goal
+                attributes[UNKNOWN_END] = True
             return Received(Envelope("response", attributes))
 
     def _call(self, envelope: Envelope) -> Envelope:
@@ -482,6 +484,8 @@ def _result(said: Envelope, *, is_nested: bool) -> Envelope:
     }
     if reason:
         attributes["reason"] = reason
+    if status not in _OUTCOMES:
+        attributes[UNKNOWN_END] = True
     flat = {name: value for name, value in body.items() if name != "status"}
     return Envelope("response", attributes, body.get("result") if is_nested else flat)
 

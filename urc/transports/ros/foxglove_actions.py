@@ -21,7 +21,7 @@ Sources: ROS 2 design, Actions; action_msgs/msg/GoalStatus.
 import secrets
 from typing import Final, Protocol
 
-from urc.model.payload import Envelope
+from urc.model.payload import UNKNOWN_END, Envelope
 from urc.transports._faults import one_line
 from urc.transports.ros.foxglove_cancellations import (
     CANCEL_GOAL,
@@ -32,6 +32,7 @@ from urc.transports.ros.foxglove_cancellations import (
 from urc.transports.ros.foxglove_frames import ServiceReply, ServiceType
 from urc.transports.ros.foxglove_watches import StatusWatches
 from urc.transports.ros.goals import MAX_GOALS, UnfinishedGoals
+from urc.transports.topic_queue import TopicReceiveQueue
 
 __all__ = ["FEEDBACK", "ActionCalls", "FoxgloveActions", "feedback_of"]
 
@@ -52,6 +53,8 @@ def feedback_of(topic: str) -> str:
 
 class ActionCalls(CancelCalls, Protocol):
     """The parts of a session that goals need."""
+
+    queue: TopicReceiveQueue
 
     def has_service(self, suffix: str) -> bool:
         """Return whether the bridge offers a service whose name has this end."""
@@ -130,9 +133,9 @@ class FoxgloveActions:
         self, goal: str, action: str, number: object, reply: ServiceReply | None, fault: str
     ) -> None:
         """Ask for the result of an accepted goal."""
-        if reply is None:  # the goal is kept, because the robot may have received it
+        if reply is None:  # the robot may have received the goal
             self._cancellations.unanswered(goal)
-            self._calls.answer(number, fault)
+            self.lose(number, fault)
             return
         if not first_value(reply, "accepted"):
             self.ended(goal)
@@ -141,11 +144,16 @@ class FoxgloveActions:
         self._cancellations.accepted(goal, action)
         service = self._calls.service(action + GET_RESULT)
         if service is None:
-            self._calls.answer(number, f"the bridge does not offer {action + GET_RESULT}")
+            self.lose(number, f"the bridge does not offer {action + GET_RESULT}")
             return
         body = {"goal_id": {"uuid": list(bytes.fromhex(goal))}}
         attributes = {"id": number, "result_of": goal}
         self._calls.return_unencoded(service, attributes, body)
+
+    def lose(self, number: object, reason: str) -> None:
+        """Report a goal whose result cannot arrive; the goal is kept, because it may go on."""
+        attributes = {"id": number, "ok": False, "reason": reason, UNKNOWN_END: True}
+        self._calls.queue.answer(Envelope("response", attributes))
 
     def ended(self, goal: str) -> str:
         """Forget a goal whose result has arrived; return the reason if it ended as cancelled."""

@@ -349,8 +349,9 @@ class FoxgloveSession:
             done(None, reason)
             return
         number, service = self._calls.pop(call, (None, ""))
-        self._results.pop(call, None)  # the goal is kept, because the robot may still follow it
-        if service:
+        if self._results.pop(call, ""):
+            self._actions.lose(number, reason)
+        elif service:
             self.answer(number, reason)
 
     def answer(self, number: object, reason: str = "", values: object = None) -> None:

@@ -99,6 +99,8 @@ class RouteAction:
         self.missed: list[int] = []
         self.cancels: list[tuple[str, int]] = []
         """Goal id and return code of each cancellation; the id of all goals is zero."""
+        self.breaks = False
+        """Whether the call fails that sends a goal, although the robot follows the goal."""
         self.hides = False
         """Whether the robot reports success for cancellations, but ends no goal, as rclpy can."""
         self.forgets = 0
@@ -168,6 +170,8 @@ class RouteAction:
         if self.accepts:
             self.goals[bytes(request.goal_id.uuid).hex()] = Goal(request.goal)
             self._publish_status()
+        if self.breaks:
+            raise TimeoutError("the call took too long")
         stamp = STORE.types["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
         name = "FollowWaypoints_SendGoal_Response"
         return _packed(_made(name, accepted=self.accepts, stamp=stamp), f"nav2_msgs/msg/{name}")
