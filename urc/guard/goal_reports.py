@@ -56,11 +56,18 @@ class GoalReports:
             return "owed"
         return "dropped" if action in record.dropped else "answered"
 
-    def end(self) -> list[str]:
-        """Take all unanswered cancellations as dropped; return the transports that have any."""
-        lines = [line for line, record in self._records.items() if record.owed]
-        for line in lines:
-            record = self._records[line]
-            dropped = dict.fromkeys((*record.dropped, *record.owed))
-            self.changed(line, record._replace(owed=(), dropped=tuple(dropped)))
+    def end(self, actions: Collection[str]) -> list[str]:
+        """Take unanswered cancellations as dropped; return the transports that have any.
+
+        Args:
+            actions: the actions whose cancellations end.
+        """
+        lines = []
+        for line, record in tuple(self._records.items()):
+            ended = [one for one in record.owed if one in actions]
+            if ended:
+                lines.append(line)
+                owed = tuple(one for one in record.owed if one not in actions)
+                dropped = tuple(dict.fromkeys((*record.dropped, *ended)))
+                self.changed(line, record._replace(owed=owed, dropped=dropped))
         return lines

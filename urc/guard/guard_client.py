@@ -17,7 +17,7 @@ lost when the guard process dies.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Final, NamedTuple
@@ -255,10 +255,10 @@ class GuardClient:
         if control is not None:
             control.counted = None
 
-    def end_cancellations(self) -> None:
-        """End unanswered cancellations of all goals, also in a guard that starts later."""
-        for line in self.goals.end():
-            self.channel.post(messages.EndCancellations(line))
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """End unanswered cancellations of `actions`, also in a guard that starts later."""
+        for line in self.goals.end(actions):
+            self.channel.post(messages.EndCancellations(line, tuple(actions)))
 
     # -- the guard: `ChannelListener`
 

@@ -166,9 +166,11 @@ class ReplaceStop(msgspec.Struct, array_like=True, frozen=True, tag=11):
 
 
 class EndCancellations(msgspec.Struct, array_like=True, frozen=True, tag=12):
-    """End a transport's unanswered cancellations of all goals, because STOP was reset."""
+    """End a transport's unanswered cancellations of STOP, because STOP was reset."""
 
     line: str
+    actions: tuple[str, ...]
+    """The actions of which STOP has cancelled all goals."""
 
 
 class LineOpened(msgspec.Struct, array_like=True, frozen=True, tag=21):

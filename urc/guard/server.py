@@ -124,7 +124,7 @@ class GuardServer:
     def _end_cancellations(self, said: messages.EndCancellations) -> None:
         transport = self._lines[said.line].transport
         if isinstance(transport, SupportsGoals):
-            transport.end_cancellations()
+            transport.end_cancellations(said.actions)
 
     def _owe(self, said: messages.RecoverStop) -> None:
         line = self._controls[said.control] = self._lines[said.line]

@@ -7,7 +7,8 @@ because a command may have waited in a queue or for a confirmation.
 """
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import NamedTuple, Protocol
 
 from urc.guard.goal_reports import GoalReports
@@ -24,6 +25,7 @@ from urc.runtime.clock import Clock
 from urc.runtime.held_commands import MotionSession
 from urc.runtime.hub import Hub
 from urc.runtime.motion_controller import MotionController
+from urc.runtime.running_goals import action_of
 from urc.runtime.session import CommandFailed
 
 __all__ = [
@@ -69,6 +71,9 @@ class Drivable(MotionSession, Protocol):
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
+
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """End unanswered cancellations of all goals of ROS actions."""
 
 
 class CommandRefused(CommandFailed):
@@ -129,6 +134,8 @@ class OneShotCommands:
         self.on_stopped: Callable[[], None] = _nobody
         """Callback for each press of STOP."""
         self._pressed = asyncio.Event()
+        self._cancelled: dict[str, None] = {}
+        """ROS actions of which STOP has cancelled all goals since the last reset."""
 
     def admit(
         self, client: Operator, command: str, arguments: Mapping[str, object], stops: int | None
@@ -196,8 +203,13 @@ class OneShotCommands:
             self._pressed.set()
 
     def reset(self) -> None:
-        """Permit autonomous motion again after a reset."""
+        """Permit autonomous motion again after a reset, and end the cancellations of STOP.
+
+        The cancellations of an operator's commands go on, because the reset does not concern them.
+        """
+        cancelled, self._cancelled = self._cancelled, {}
         if self._session is not None:
+            self._session.end_cancellations(cancelled)
             self._session.latch("")
 
     async def _give_stops(self, session: Drivable) -> None:
@@ -249,7 +261,7 @@ class OneShotCommands:
         since = session.goals.number
         outcome, is_heard = "done", True
         try:
-            await session.command(command, {}, on_sent=sent.append)
+            await session.command(command, {}, on_sent=partial(self._sent, sent))
         except CommandFailed as failed:
             outcome = f"{failed.code}: {failed.message}"
             # A refused stop is repeated, too: the robot may go on. A reset ends the retries.
@@ -262,6 +274,12 @@ class OneShotCommands:
             self._controller().await_answer(command)
         if is_heard:
             self._controller().given(command)
+
+    def _sent(self, sent: list[Payload], payload: Payload) -> None:
+        """Note what a stop command is sending."""
+        sent.append(payload)
+        if action := action_of(payload, "cancel"):
+            self._cancelled[action] = None
 
 
 def _nobody() -> None:

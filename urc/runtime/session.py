@@ -3,7 +3,7 @@
 import asyncio
 import secrets
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
 from functools import partial
 from itertools import count
@@ -358,19 +358,20 @@ class Session:
             reason: reason to display; "" permits autonomous motion again.
         """
         self._stops += reason != ""
-        if not reason:
-            self._end_cancellations()
         self._dispatcher.latch(reason)
 
-    def _end_cancellations(self) -> None:
-        """End unanswered cancellations of all goals, which would also end new goals."""
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """End unanswered cancellations of all goals of `actions`, which would also end new goals.
+
+        A reset of STOP ends those that STOP has sent. Those of commands go on.
+        """
         if self.backend is not None:
-            self.backend.end_cancellations()
+            self.backend.end_cancellations(actions)
             return
-        for line in self._goals.end():
+        for line in self._goals.end(actions):
             transport = self._transports[line]
             if isinstance(transport, SupportsGoals):
-                transport.end_cancellations()
+                transport.end_cancellations(actions)
 
     async def _first_attempt(self, name: str, given: Mapping[str, Reading]) -> None:
         """Wait, within a time limit, until the first attempt of a command's links has ended.

@@ -1,6 +1,6 @@
 """A fake robot for the dashboard: profiles with widgets, and a session without a transport."""
 
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from functools import lru_cache
 from pathlib import Path
@@ -142,6 +142,8 @@ class FakeRobot:
         """Number of calls of `reconnect` so far."""
         self.latched: list[str] = []
         """Reasons for all latched stops, in order."""
+        self.ended: list[tuple[str, ...]] = []
+        """Actions whose cancellations each reset has ended."""
         self.frames = FakeFrames(profile.driver)
         self.backend: MotionBackend | None = FakeMotionBackend(self.clock)
         self.on_motion: Callable[[MotionEvent], None] | None = None
@@ -194,6 +196,10 @@ class FakeRobot:
     def latch(self, reason: str) -> None:
         """Record the reason for a latched stop."""
         self.latched.append(reason)
+
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """Record the actions whose cancellations end."""
+        self.ended.append(tuple(actions))
 
     def set_reading(
         self, signal: str, value: Reading, *, alarm: Alarm = "", age_s: float = 0.0

@@ -6,7 +6,7 @@ for messages. A transport converts every library exception into one of the error
 Only `urc.runtime.link` uses transports, including transports in another process.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Final, NamedTuple, Protocol, runtime_checkable
 
 from urc.model.payload import Payload
@@ -282,11 +282,11 @@ class SupportsGoals(Protocol):
                 reported before it is sent.
         """
 
-    def end_cancellations(self) -> None:
-        """End the repetition of all unanswered cancellations of all goals; never raises.
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """End the repetition of unanswered cancellations of all goals of `actions`; never raises.
 
-        A later reset of STOP permits new goals, which such a cancellation would end, too. Goals
-        that were cancelled by their ids are still cancelled.
+        A reset of STOP permits new goals, which such a cancellation would end, too. Goals that were
+        cancelled by their ids are still cancelled.
         """
 
 

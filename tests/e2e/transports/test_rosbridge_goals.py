@@ -387,7 +387,10 @@ async def test_a_reset_ends_unanswered_cancellations_of_all_goals(
             await session.command("stop_docking", {})
             await holds(lambda: bool(blocked))
             assert session.goals.answer("ros", "/dock", since) == "owed"
+            session.end_cancellations(["/other"])
             session.latch("")
+            assert session.goals.answer("ros", "/dock", since) == "owed"
+            session.end_cancellations(["/dock"])
             assert session.goals.answer("ros", "/dock", since) == "dropped", "no answer came"
             await asyncio.sleep(0.3)
             count = len(blocked)

@@ -7,7 +7,7 @@ import os
 import signal
 import socket
 import sys
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from io import BytesIO
 from typing import Any, ClassVar
 
@@ -90,8 +90,8 @@ class GoalWire(CountedWire):
     def keep_goals(self, record: GoalRecord, changed: Callable[[GoalRecord], None]) -> None:
         self.kept, self.changed = record, changed
 
-    def end_cancellations(self) -> None:
-        self.kept = self.kept._replace(owed=(), dropped=self.kept.owed)
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        self.kept = self.kept._replace(owed=(), dropped=tuple(actions))
 
     @staticmethod
     def make(setup: TransportSetup) -> "GoalWire":
@@ -112,7 +112,7 @@ def test_goals_are_handed_to_the_guard_and_their_changes_reported() -> None:
     after = GoalRecord((("a1", "/dock", True), ("b2", "/dock", False)))
     robot.changed(after)
     assert said == [messages.GoalsChanged("wire", after)]
-    host.handle(messages.EndCancellations("wire"))
+    host.handle(messages.EndCancellations("wire", ("/dock",)))
     assert (robot.kept.owed, robot.kept.dropped) == ((), ("/dock",))
 
 

@@ -5,6 +5,9 @@ import struct
 import pytest
 
 from tests.unit.transports.foxglove_bridge import ALL, CANCEL, DOCK, TEXTS, YES, Bridge, code
+from urc.guard.goal_reports import GoalReports
+from urc.transports.base import GoalRecord, SupportsGoals, TransportSetup
+from urc.transports.ros.choice import from_setup
 from urc.transports.ros.goals import LATE, UnfinishedGoals
 
 
@@ -55,3 +58,26 @@ def test_a_goal_carries_the_robots_time_in_place_of_now(monkeypatch: pytest.Monk
     assert (count, second, third) == (3, 5, 6)
     assert first == last
     assert robot_s <= first <= robot_s + 60
+
+
+@pytest.mark.parametrize("via", ["foxglove", "rosbridge", "auto"])
+def test_a_reset_names_the_actions_whose_cancellations_end(via: str) -> None:
+    """The goals of /dock were cancelled by a command, and those of /follow by STOP."""
+    transport = from_setup(TransportSetup("ros", {"via": via, "host": "127.0.0.1"}))
+    assert isinstance(transport, SupportsGoals)
+    reports: list[GoalRecord] = []
+    transport.keep_goals(GoalRecord(owed=("/dock", "/follow")), reports.append)
+    transport.end_cancellations(["/follow", "/never"])
+    assert reports == [GoalRecord(owed=("/dock",), dropped=("/follow",))]
+
+
+def test_reports_take_only_the_named_cancellations_as_dropped() -> None:
+    reports = GoalReports(("a", "b", "c"))
+    reports.changed("a", GoalRecord(owed=("/dock", "/follow"), dropped=("/old",)))
+    reports.changed("b", GoalRecord(owed=("/dock",)))
+    since = 0
+    assert reports.end(["/follow"]) == ["a"]
+    assert reports.answer("a", "/follow", since) == "dropped"
+    assert [reports.answer(line, "/dock", since) for line in "ab"] == ["owed", "owed"]
+    assert reports.end(["/dock"]) == ["a", "b"]
+    assert reports.end(["/dock", "/follow"]) == []

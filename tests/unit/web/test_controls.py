@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Collection
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -47,6 +47,9 @@ class Scene:
 
     def latch(self, reason: str) -> None:
         """Take why nothing may be begun that moves by itself."""
+
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """Take the actions whose cancellations end."""
 
     def add_page(self, place: str = "", role: Role = "drive") -> OperatorSession:
         """Sit down, and read what is told at once."""

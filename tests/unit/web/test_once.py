@@ -222,6 +222,23 @@ async def test_a_stop_that_cancels_goals_is_confirmed_when_the_robot_has_answere
         assert [name for name, _ in it.robot.commands] == ["halt", "abandon"]
 
 
+async def test_a_reset_ends_the_cancellations_of_stop_but_not_those_of_commands() -> None:
+    """An operator has cancelled the goals of another action, and nobody has withdrawn that."""
+    leave = Command("leave", "wire", WriteSpec("json", {"verb": "cancel"}))
+    async with scene(commands=FOLD | ABANDON | {"leave": leave}) as it:
+        it.robot.payloads["abandon"] = GOALS
+        it.robot.payloads["leave"] = Envelope("cancel", {"action": "/follow"})
+        it.line.say({"t": "run", "id": 1, "command": "leave", "arguments": {}})
+        await settle()
+        for _ in range(2):
+            it.line.say({"t": "stop"})
+            await it.clock.advance(1)
+            it.line.say({"t": "drive", "verb": "reset"})
+            await settle()
+        assert [name for name, _ in it.robot.commands][:2] == ["leave", "abandon"]
+        assert it.robot.ended == [("/dock",), ("/dock",)]
+
+
 async def test_a_cancellation_that_never_left_is_sent_again_and_not_confirmed() -> None:
     """As when the guard ends between the command and its frame; older reports prove nothing."""
     async with scene(commands=FOLD | ABANDON) as it:

@@ -9,7 +9,7 @@ import asyncio
 import logging
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Generator, Iterable, Mapping, Set
+from collections.abc import AsyncIterator, Callable, Collection, Generator, Iterable, Mapping, Set
 from contextlib import asynccontextmanager, suppress
 from itertools import islice
 from typing import Final
@@ -303,3 +303,6 @@ class PlaybackSession:
 
     def latch(self, reason: str) -> None:
         """Do nothing, because a recording does not move a robot."""
+
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """Do nothing, because a recording cancels nothing."""

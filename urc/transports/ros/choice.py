@@ -7,7 +7,7 @@ With ``via: auto`` and no port, the transport tries the usual ports of both kind
 the port that worked last.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from typing import Final, Protocol
 
@@ -65,7 +65,7 @@ class _Bridge(Protocol):
     async def probe(self) -> None: ...
     def arrivals(self) -> int: ...
     def unsent(self) -> int: ...
-    def end_cancellations(self) -> None: ...
+    def end_cancellations(self, actions: Collection[str]) -> None: ...
 
 
 class Candidate:
@@ -125,11 +125,11 @@ class AnyBridgeTransport:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
 
-    def end_cancellations(self) -> None:
+    def end_cancellations(self, actions: Collection[str]) -> None:
         """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
         if self._bridge is not None:
-            self._bridge.end_cancellations()
-        for action in self._goals.owed():
+            self._bridge.end_cancellations(actions)
+        for action in self._goals.owed(actions):
             self._goals.drop(action)
 
     async def open(self, timeout_s: float) -> None:

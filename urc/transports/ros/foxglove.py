@@ -14,7 +14,7 @@ announced again as soon as a connection opens.
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from typing import Final
 
@@ -89,9 +89,9 @@ class FoxgloveTransport:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
 
-    def end_cancellations(self) -> None:
+    def end_cancellations(self, actions: Collection[str]) -> None:
         """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
-        for action in self._goals.owed():
+        for action in self._goals.owed(actions):
             if self._session is not None:
                 self._session.drop_cancellation(action)
             self._goals.drop(action)

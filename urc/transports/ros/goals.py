@@ -6,7 +6,8 @@ must also cancel a goal that was sent before a loss.
 
 The record also keeps the actions of which all goals are to be cancelled. The robot *owes* an answer
 to this cancellation. The cancellation is repeated, on later connections too, until the answer
-arrives. It is *dropped* without an answer when a new goal of the action is sent, or STOP is reset.
+arrives. It is *dropped* without an answer when a new goal of the action is sent. A reset of STOP
+drops those that STOP has sent.
 
 The robot can receive a cancellation of all goals late, and then it also ends newer goals. The
 record therefore keeps the actions with a call that was not answered, and explains such an end.
@@ -16,7 +17,7 @@ that were sent through its own kind of bridge by their ids.
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Final
 
 from urc.transports.base import GoalRecord
@@ -145,9 +146,13 @@ class UnfinishedGoals:
         """Return whether the robot owes an answer to the cancellation of all goals."""
         return action in self._owed
 
-    def owed(self) -> list[str]:
-        """Return the actions that owe the cancellation of all goals, oldest first."""
-        return list(self._owed)
+    def owed(self, actions: Collection[str] | None = None) -> list[str]:
+        """Return the actions that owe the cancellation of all goals, oldest first.
+
+        Args:
+            actions: the actions to look at; None for all.
+        """
+        return [one for one in self._owed if actions is None or one in actions]
 
     def settle(self, action: str) -> None:
         """Forget the cancellation of all goals, because it was answered."""

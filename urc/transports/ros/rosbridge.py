@@ -25,7 +25,7 @@ subscriptions wait for the list of topics, which determines the form of the type
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
 from typing import Any, Final, Literal
@@ -116,9 +116,9 @@ class RosbridgeTransport:
         """Take over the goals of an earlier process; see `urc.transports.base.SupportsGoals`."""
         self._goals.keep(record, changed)
 
-    def end_cancellations(self) -> None:
+    def end_cancellations(self, actions: Collection[str]) -> None:
         """End unanswered cancellations of all goals; see `urc.transports.base.SupportsGoals`."""
-        for action in self._goals.owed():
+        for action in self._goals.owed(actions):
             if self._session is not None:
                 self._session.drop_cancellation(action)
             self._goals.drop(action)

@@ -10,7 +10,7 @@ import logging
 import secrets
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from collections.abc import AsyncIterator, Callable, Collection, Iterator, Mapping
 from contextlib import (
     AbstractAsyncContextManager,
     AsyncExitStack,
@@ -139,6 +139,9 @@ class SessionLike(MotionSession, Protocol):
 
     def latch(self, reason: str) -> None:
         """Latch STOP, end sequences and block autonomous motion; an empty `reason` resets STOP."""
+
+    def end_cancellations(self, actions: Collection[str]) -> None:
+        """End unanswered cancellations of all goals of ROS actions."""
 
 
 Glimpse = bytes | Mapping[str, Reading] | None
