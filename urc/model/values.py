@@ -219,6 +219,8 @@ class Signal(NamedTuple):
     means that the driver declares none."""
     transform: FrameChange | None = None
     """Change of the formula's result to `frame`; None means no change."""
+    has_capture_time: bool = True
+    """Whether the time of capture in an image's message can make the image older."""
 
     @property
     def inputs(self) -> frozenset[str]:

@@ -8,7 +8,8 @@ relay of URC.
 
 The first line of standard input is a `DemuxJob` as JSON. Standard output contains records: length
 (u32) and kind (u8), then the content. The kind ``U`` is an access unit as the value of a signal
-(`urc.video`). The kind ``F`` is a fault in one line, and the last record.
+(`urc.video`). The kind ``N`` is a line for the log. The kind ``F`` is a fault in one line, and the
+last record.
 """
 
 import json
@@ -23,14 +24,28 @@ from io import RawIOBase
 from typing import Any, BinaryIO, Final, NamedTuple
 
 from urc._h264 import BadStream, StreamInfo, info_of, is_keyframe, with_parameter_sets
+from urc.capture_clock import CaptureClock, step_words
 from urc.images import MAX_PIXELS
 from urc.video import MAX_UNIT_BYTES, VideoUnit, encode_unit
 
-__all__ = ["FAULT", "RECORD", "UNIT", "DemuxFault", "DemuxJob", "UnitQueue", "UnitReader", "main"]
+__all__ = [
+    "FAULT",
+    "NOTE",
+    "RECORD",
+    "UNIT",
+    "CapturedUnits",
+    "DemuxFault",
+    "DemuxJob",
+    "UnitQueue",
+    "UnitReader",
+    "capture_s",
+    "main",
+]
 
 RECORD: Final = struct.Struct(">Ic")
 UNIT: Final = b"U"
 FAULT: Final = b"F"
+NOTE: Final = b"N"
 QUEUE_BYTES: Final = 8_388_608
 QUEUE_UNITS: Final = 240
 """Maximum number of queued access units: the oldest group of pictures is dropped first."""
@@ -43,6 +58,11 @@ PROBE_US: Final = 500_000
 _NETWORK_S: Final = 0.005
 """Wait for a packet that shows that the library has no more packets in stock, in seconds."""
 _MOST_EARLY: Final = 200
+_MOST_REORDERED_S: Final = 0.5
+"""Time by which an image may be captured before the previous one, because of B-frames."""
+_OLDEST_S: Final = 50.0
+"""Highest age before arrival, in seconds; the server does not believe times that are much older."""
+_REFERENCE: Final = struct.Struct("=q")
 _CODECS: Final = {"h264": False, "hevc": True}
 """Whether the codec is H.265, keyed by the library's name."""
 
@@ -75,6 +95,7 @@ class UnitQueue:
         self._units: deque[tuple[bool, bytes]] = deque()
         self._bytes = 0
         self._needs_key = True
+        self._told = b""
         self._changed = threading.Condition()
         self._is_over = False
 
@@ -98,10 +119,19 @@ class UnitQueue:
             self._bytes += len(record)
             self._changed.notify()
 
+    def tell(self, record: bytes) -> None:
+        """Add a record that is no access unit; a newer one replaces it."""
+        with self._changed:
+            self._told = record
+            self._changed.notify()
+
     def take(self) -> bytes | None:
         """Return the next record, after a wait if necessary; None at the end."""
         with self._changed:
             while not self._units:
+                if self._told:
+                    told, self._told = self._told, b""
+                    return told
                 if self._is_over:
                     return None
                 self._changed.wait()
@@ -210,6 +240,43 @@ class EarlyUnits:
         return found
 
 
+class CapturedUnits:
+    """Makes units older as their times of capture state; see `urc.capture_clock`.
+
+    An RTSP camera states its clock in RTCP sender reports, every few seconds. The library then
+    computes the time of each image on this clock. Images before the first report have only their
+    time of arrival, and so have all images of other streams.
+    """
+
+    def __init__(self) -> None:
+        """Begin without a time of capture."""
+        self._clock = CaptureClock(_MOST_REORDERED_S)
+
+    def aged(self, unit: VideoUnit, captured_s: float | None, queue: "UnitQueue") -> VideoUnit:
+        """Return the unit with its age in its time; put a line about a clock step into `queue`."""
+        if captured_s is None:
+            return unit
+        age = self._clock.age(captured_s, unit.time_s)
+        if age.step_s:
+            queue.tell(_record(NOTE, step_words(age.step_s).encode()))
+        return unit._replace(time_s=unit.time_s - min(age.older_s, _OLDEST_S))
+
+
+def capture_s(packet: Any) -> float | None:
+    """Return when an image was captured by the camera's clock, in seconds; None if unknown.
+
+    The library keeps the time as a *producer reference time*: microseconds since 1970 in 64 bits,
+    then flags.
+    """
+    if not packet.has_sidedata("prft"):
+        return None
+    data = bytes(packet.get_sidedata("prft"))
+    if len(data) < _REFERENCE.size:
+        return None
+    (wall_us,) = _REFERENCE.unpack_from(data)
+    return wall_us / 1e6 if wall_us > 0 else None
+
+
 def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
     """Read a stream until its end, and put its access units into a queue.
 
@@ -267,7 +334,7 @@ def _read_stream(
     *,
     is_hevc: bool,
 ) -> None:
-    extra = stream.codec_context.extradata or b""
+    extra, dated = stream.codec_context.extradata or b"", CapturedUnits()
     reader = UnitReader(is_hevc=is_hevc, extra=_plain(extra), began_s=time.monotonic())
     convert = None
     if extra and not _has_start_code(extra):  # MP4: lengths instead of start codes
@@ -279,11 +346,12 @@ def _read_stream(
         has_data = packet.size > 0  # the filter empties the packet
         if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
             _put(early.stamped(), queue)
+        captured_s = capture_s(packet)  # the filter drops it
         packets: Iterable[Any] = [packet] if convert is None else convert.filter(packet)
         for one in packets if has_data else ():
             unit = reader.unit(bytes(one), came_s)
             if unit is not None and early.is_over:
-                _put([unit], queue)
+                _put([dated.aged(unit, captured_s, queue)], queue)
             elif unit is not None:
                 early.add(unit, None if one.pts is None else float(one.pts * one.time_base))
         asked_s = time.monotonic()

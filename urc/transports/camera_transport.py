@@ -18,9 +18,9 @@ from urllib.parse import quote
 from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, one_line
 from urc.transports._stream_dialer import StreamDialer
-from urc.transports.base import PeerClosed, TransportError
+from urc.transports.base import NOTICE, PeerClosed, TransportError
 from urc.transports.camera_options import CameraOptions
-from urc.transports.camera_process import FAULT, RECORD, DemuxJob
+from urc.transports.camera_process import FAULT, NOTE, RECORD, DemuxJob
 from urc.transports.camera_relay import RtspRelay, RtspWatch
 from urc.transports.http_body import fault_of
 from urc.transports.http_client import HttpClient
@@ -66,8 +66,8 @@ class CameraTransport:
         self._connection = await _connected(self._options, timeout_s)
         self._is_open = True
 
-    async def receive(self) -> bytes:
-        """Return the next access unit; wait while the transport is paused.
+    async def receive(self) -> Payload:
+        """Return the next access unit, or a notice for the log; wait while the transport is paused.
 
         Raises:
             PeerClosed: the connection has ended, or the stream cannot be used.
@@ -176,8 +176,12 @@ class _CameraConnection:
         except OSError as fault:
             raise PeerClosed(self._why()) from fault
 
-    async def unit(self) -> bytes:
-        """Return the next access unit; raise `PeerClosed` at the end or after too long a pause."""
+    async def unit(self) -> Payload:
+        """Return the next access unit, or a notice for the log.
+
+        Raises:
+            PeerClosed: at the end, or after too long a pause.
+        """
         limit_s = SILENCE_S if self._has_unit else FIRST_S
         try:
             async with asyncio.timeout(limit_s):
@@ -188,7 +192,7 @@ class _CameraConnection:
         self._has_unit = True
         return record
 
-    async def _record(self) -> bytes:
+    async def _record(self) -> Payload:
         process = self._process
         if process is None or process.stdout is None:
             raise PeerClosed(self._why())
@@ -202,6 +206,8 @@ class _CameraConnection:
             raise PeerClosed(self._why()) from fault
         if kind == FAULT:
             raise PeerClosed(self._why(one_line(content.decode("utf-8", "replace"), 300)))
+        if kind == NOTE:
+            return Envelope(NOTICE, {}, one_line(content.decode("utf-8", "replace"), 300))
         return content
 
     def _why(self, said: str = "") -> str:

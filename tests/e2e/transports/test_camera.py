@@ -135,6 +135,68 @@ async def test_a_password_never_leaves_as_plain_text_if_the_document_says_digest
     assert told.startswith("the camera asks for the password as plain text")
 
 
+class SlowLine:
+    """A line to a server that delivers the server's bytes after a delay, which can grow."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+        self.delay_s = 0.0
+
+    @asynccontextmanager
+    async def opened(self) -> AsyncIterator[int]:
+        server = await asyncio.start_server(self._serve, "127.0.0.1", 0)
+        async with server:
+            yield server.sockets[0].getsockname()[1]
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", self._port)
+        loop = asyncio.get_running_loop()
+        waiting: asyncio.Queue[tuple[float, bytes]] = asyncio.Queue()
+
+        async def forward() -> None:
+            while data := await reader.read(65536):
+                far_writer.write(data)
+
+        async def back() -> None:
+            while data := await far_reader.read(65536):
+                waiting.put_nowait((loop.time(), data))
+
+        async def deliver() -> None:
+            while True:
+                came_s, data = await waiting.get()
+                await asyncio.sleep(came_s + self.delay_s - loop.time())
+                writer.write(data)
+
+        tasks = [asyncio.create_task(one()) for one in (forward, back, deliver)]
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+        far_writer.close()
+        writer.close()
+
+
+@RTSP
+async def test_images_that_wait_in_the_network_are_older_than_their_arrival() -> None:
+    """By the sender reports of the server, of which the first comes after some seconds."""
+    loop = asyncio.get_running_loop()
+
+    async def oldest_s(eye: Transport, for_s: float) -> float:
+        found, end_s = 0.0, loop.time() + for_s
+        while (now_s := loop.time()) < end_s:
+            found = max(found, now_s - (await unit(eye)).time_s)
+        return found
+
+    async with rtsp_camera() as port:
+        slow = SlowLine(port)
+        async with slow.opened() as via, line(url=f"rtsp://127.0.0.1:{via}/cam") as eye:
+            await oldest_s(eye, 9.0)
+            assert await oldest_s(eye, 2.0) < 0.6
+            slow.delay_s = 1.5
+            await oldest_s(eye, 2.5)
+            assert 1.0 < await oldest_s(eye, 2.0) < 2.1
+
+
 @RTSP
 async def test_an_unknown_path() -> None:
     async with rtsp_camera() as port, line(url=f"rtsp://127.0.0.1:{port}/none") as eye:

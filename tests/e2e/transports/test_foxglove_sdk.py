@@ -3,6 +3,7 @@
 import asyncio
 import math
 import struct
+import time
 from base64 import b64decode
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
@@ -203,6 +204,45 @@ async def test_the_schemas_of_the_sdk_become_signals(tmp_path: Path, rover: Foxg
         )
         assert value(robot, "tree")["frames"][-1]["parent"] == "map"
         await until(lambda: "arm: hot" in notes(robot))
+
+
+async def test_an_image_that_waited_in_the_robot_is_older_than_its_arrival(
+    tmp_path: Path, rover: FoxgloveRobot
+) -> None:
+    """The clock of the robot is wrong by an hour, and is then set back by this hour."""
+    channel = CompressedImageChannel("/camera", context=rover.context)
+    jpeg, clock_s = picture(), 3600.0
+
+    def send(captured_s: float | None = None) -> None:
+        at_s = clock_s + (time.time() if captured_s is None else captured_s)
+        stamp = Timestamp(sec=int(at_s), nsec=int(at_s % 1 * 1e9))
+        channel.log(CompressedImage(timestamp=stamp, data=jpeg, format="jpeg"))
+
+    async with connected(tmp_path, rover.port) as robot:
+        loop = asyncio.get_running_loop()
+
+        def last_s() -> float:
+            found = robot.latest("picture")
+            return -math.inf if found is None else found.time_s
+
+        async def age_s(captured_s: float | None = None) -> float:
+            before_s = last_s()
+            send(captured_s)
+            await until(lambda: last_s() != before_s)
+            return loop.time() - last_s()
+
+        await until(lambda: value(robot, "picture") is not None, send)
+        assert await age_s() < 1.0, "a wrong clock makes nothing old"
+        captured_s = time.time()
+        await asyncio.sleep(2.0)
+        assert await age_s(captured_s) > 1.9, "it was captured before the pause"
+        assert await age_s() < 1.0
+        clock_s = 0.0
+        assert await age_s() < 1.0, "nor does a clock that is set"
+        assert notes(robot).count("compares the clocks again") == 1
+        captured_s = time.time()
+        await asyncio.sleep(2.0)
+        assert await age_s(captured_s) > 1.9
 
 
 async def test_messages_are_published_by_the_schema_of_the_server(

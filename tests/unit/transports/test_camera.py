@@ -1,5 +1,6 @@
 """Parts of the camera transport: options, the bounds of a stream, and what the relay refuses."""
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -11,11 +12,15 @@ from urc.transports import camera
 from urc.transports.base import MissingPackage, Transport, TransportError, TransportSetup
 from urc.transports.camera_process import (
     NO_KEYFRAME_S,
+    NOTE,
     QUEUE_BYTES,
+    RECORD,
+    CapturedUnits,
     DemuxFault,
     EarlyUnits,
     UnitQueue,
     UnitReader,
+    capture_s,
 )
 from urc.transports.camera_relay import RtspWatch
 from urc.video import MAX_UNIT_BYTES, VideoUnit
@@ -231,3 +236,60 @@ def test_validate_names_the_missing_library_and_finds_no_mistake(
     told = capsys.readouterr().err.splitlines()
     assert "cannot be opened on this computer: camera needs the package av: " in told[0]
     assert told[1].startswith("1 document: 0 errors, 0 warnings")
+
+
+# Times of capture
+
+
+class Packet:
+    """A packet of the library, with the library's bytes for a time of capture."""
+
+    def __init__(self, **sides: bytes) -> None:
+        self._sides = sides
+
+    def has_sidedata(self, kind: str) -> bool:
+        return kind in self._sides
+
+    def get_sidedata(self, kind: str) -> bytes:
+        return self._sides[kind]
+
+
+def prft(captured_s: float) -> Packet:
+    return Packet(prft=struct.pack("=qi4x", round(captured_s * 1e6), 24))
+
+
+def test_the_time_of_capture_is_a_time_of_day() -> None:
+    assert capture_s(prft(1_700_000_000.25)) == 1_700_000_000.25
+    assert capture_s(Packet()) is None
+    assert capture_s(Packet(prft=b"short")) is None
+    assert capture_s(prft(-5.0)) is None
+
+
+def test_a_unit_that_waited_is_older_than_its_arrival() -> None:
+    units, queue = CapturedUnits(), UnitQueue()
+
+    def age_s(captured_s: float | None, came_s: float) -> float:
+        unit = VideoUnit("avc1.42", True, 640, 480, came_s, b"x")
+        return round(came_s - units.aged(unit, captured_s, queue).time_s, 3)
+
+    assert age_s(None, 10.0) == 0
+    assert age_s(1_700_000_000.0, 10.1) == 0
+    assert age_s(1_700_000_000.1, 11.2) == 1.0
+    assert age_s(1_700_000_000.2, 200.0) == 50.0, "not more than the server believes"
+    queue.end()
+    assert queue.take() is None
+
+
+def test_a_step_of_the_cameras_clock_is_one_line_for_the_log() -> None:
+    units, queue = CapturedUnits(), UnitQueue()
+    for place, captured_s in enumerate((1000.0, 1000.1, 900.2, 900.3, 1000.4)):
+        unit = VideoUnit("avc1.42", True, 640, 480, 10.0 + place / 10, b"x")
+        assert units.aged(unit, captured_s, queue).time_s == pytest.approx(unit.time_s)
+    queue.put(b"unit", is_key=True)
+    queue.end()
+    taken = list(iter(queue.take, None))
+    assert taken[0] == b"unit"
+    size, kind = RECORD.unpack(taken[1][: RECORD.size])
+    assert (size, kind) == (len(taken[1]) - RECORD.size, NOTE)
+    assert b"100.0 s behind the earlier ones" in taken[1]
+    assert len(taken) == 2

@@ -18,6 +18,7 @@ _NUMBERS: Final = ("integer", "number")
 _ANGLE_UNITS: Final = ("rad", "deg", "°")
 _ROTATIONS: Final = ("roll", "pitch", "yaw")
 _SIZED: Final = ("array", "image", "blob", "point_cloud")
+_FILMED: Final = ("image", "video")
 _LATCHED_S: Final = 86400.0
 """Default age of an occupancy grid, in seconds: a robot may send its map only once."""
 
@@ -65,6 +66,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         colour=part.text("colour"),
         frame=frame,
         transform=parse_frame_change(part, frame, kind, problems),
+        has_capture_time=_has_capture_time(part, kind, problems),
     )
 
 
@@ -194,6 +196,19 @@ def _debounce_s(part: Node, kind: str, problems: Problems) -> float:
         text = f"'debounce' has no effect for type {kind}"
         problems.error(part, "misplaced-key", text, at="debounce", key=True)
     return problems.duration(part, "debounce", 0.0, most=3600)
+
+
+def _has_capture_time(part: Node, kind: str, problems: Problems) -> bool:
+    if kind not in _FILMED and "capture_time" in part.data:
+        problems.error(
+            part,
+            "misplaced-key",
+            f"'capture_time' has no effect for type {kind}",
+            at="capture_time",
+            key=True,
+            hint="this key needs 'type: image' or 'type: video'",
+        )
+    return part.flag("capture_time", default=True)
 
 
 def _formula(part: Node, problems: Problems) -> Template | None:

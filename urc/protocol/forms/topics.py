@@ -17,7 +17,8 @@ from urc.model.sequence import ExpectStep, SendStep, all_steps
 from urc.model.values import WHOLE_TYPES, Value
 from urc.problems import UrcError
 from urc.protocol.forms.json_text import filled
-from urc.protocol.ros.wanted import ALL, PACKED, Path, paths_of, wanted_of
+from urc.protocol.readings.capture_times import capture_paths
+from urc.protocol.ros.wanted import ALL, EACH, PACKED, Path, paths_of, wanted_of
 from urc.protocol.values.payload import CodecContext, Frame, NotWritable, PayloadReader
 from urc.protocol.values.time_and_nonce import FIXED, TimeAndNonce
 from urc.ros_names import resolved_name
@@ -275,7 +276,9 @@ def paths_by_topic(
     namespace = namespace_of(driver.transports[transport], settings)
     for read in _reads(driver, transport):
         if read.topic is not None:
-            paths = paths_of(read, kinds["occupancy_grid"], kinds["transform_tree"])
+            paths = list(paths_of(read, kinds["occupancy_grid"], kinds["transform_tree"]))
+            for places in capture_paths(read, driver.signals).values():
+                paths += [tuple(s if isinstance(s, str) else EACH for s in one) for one in places]
             found.setdefault(topic_of(read, settings, namespace), []).extend(paths)
     return found
 

@@ -32,6 +32,15 @@ _LEVELS: Final = ("info", "warning", "error")
 class Acknowledgements(list[Payload | CountedFrame | Noted]):
     """Pending acknowledgements and log entries of messages, in order."""
 
+    def note_of(self, transport: str) -> Callable[[str], None]:
+        """Return a function that adds a line to the log of a transport."""
+
+        def note(text: str) -> None:
+            if len(self) < MOST_REPLIES:
+                self.append(Noted(transport, "info", printable(text)[:LONGEST_NOTE]))
+
+        return note
+
 
 class Collector:
     """A collector that builds one value from several frames."""

@@ -4,17 +4,25 @@ from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
+from urc.capture_clock import CaptureClock
 from urc.expressions import COUNTERS, NONCE, NOW
 from urc.model.driver import Argument, Command, Driver, Message, Poll, Reply, TransportSpec
 from urc.model.exchange import RESENDS, ProvisionalReplies, Stage
 from urc.model.payload import NUMBERED, Payload, ReadSpec, WriteSpec
 from urc.model.sequence import ExpectStep, SendStep
+from urc.model.text import JsonPath
 from urc.model.values import NOTHING
 from urc.protocol.forms.http_head import LOCATION
 from urc.protocol.forms.json_text import filled
 from urc.protocol.forms.table import build_reader
 from urc.protocol.forms.topics import context_of, paths_by_topic, topic_of
 from urc.protocol.framing.table import build_framing
+from urc.protocol.readings.capture_times import (
+    StampedReader,
+    capture_paths,
+    dating,
+    with_captures,
+)
 from urc.protocol.readings.compiled import build_fast_read
 from urc.protocol.readings.readings import Readings
 from urc.protocol.requests.bounds import queue_limit_s
@@ -67,8 +75,11 @@ class RequestCompiler:
             messages = [one for one in driver.messages.values() if one.transport == name]
             context = context_of(spec, self._readings.settings, fresh, is_compiled=is_compiled)
             matchers = [self._message(one.read, context) for one in messages]
-            if any(one.acknowledge or one.log or one.read.collects for one in messages):
-                self._react(spec, messages, matchers, context)
+            captures = self._captures(spec, messages)
+            if any(captures) or any(
+                one.acknowledge or one.log or one.read.collects for one in messages
+            ):
+                self._react(spec, messages, matchers, captures, context)
             else:
                 self.lines[name] = Conversation(spec, matchers)
             self.lines[name].codec = self._codec(spec)
@@ -84,18 +95,36 @@ class RequestCompiler:
         paths = paths_by_topic(self._driver, spec.name, settings)
         return TopicCodec(paths, is_ros1=spec.options.get("version") == 1, has_hashes=has_hashes)
 
+    def _captures(
+        self, spec: TransportSpec, messages: list[Message]
+    ) -> list[dict[str, tuple[JsonPath, ...]]]:
+        """Return the places of times of capture in each message; none for simulated times.
+
+        A simulation may run slower than the clock of this computer.
+        """
+        settings = self._readings.settings
+        if filled(spec.options.get("use_sim_time"), {"settings": settings}) is True:
+            return [{} for _ in messages]
+        return [capture_paths(one.read, self._driver.signals) for one in messages]
+
     def _react(
         self,
         spec: TransportSpec,
         messages: list[Message],
         matchers: list[Matcher],
+        captures: list[dict[str, tuple[JsonPath, ...]]],
         context: CodecContext,
     ) -> None:
         """Add the effects that messages declare, such as acknowledgements, to their matchers."""
         replies, kept = Acknowledgements(), list[Collector]()
         framing, name = build_framing(spec.framing), spec.name
+        clocks: dict[str, CaptureClock] = {}
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
-            decode = matcher.decode
+            decode, reader = matcher.decode, matcher.reader
+            if captures[place]:
+                stamped = with_captures(one.read, captures[place])
+                reader = StampedReader(build_reader(stamped, context))
+                decode = dating(captures[place], clocks, replies.note_of(name), decode)
             if one.read.collects:
                 collectors = {key: Collector(what) for key, what in one.read.collects.items()}
                 kept += collectors.values()
@@ -108,7 +137,7 @@ class RequestCompiler:
             if one.log is not None:
                 decode = noting(one.log, name, partial(self._view, name), replies, decode)
             if decode is not matcher.decode:
-                matchers[place] = Matcher(matcher.reader, decode)
+                matchers[place] = Matcher(reader, decode)
         line = self.lines[name] = Conversation(spec, matchers)
         line.receiver.replies, line.receiver.collectors = replies, kept
 
