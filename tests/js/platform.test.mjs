@@ -204,6 +204,9 @@ test("a binary frame is an image with its signal, age and type", () => {
   assert.deepEqual([frame?.index, frame?.ageMs, frame?.sentMs, frame?.number, frame?.type], [513, 40, 1000, 70000, type]);
   assert.deepEqual([...(frame?.bytes ?? [])], [7, 8]);
   for (const size of [0, 15, 20]) assert.equal(frameOf(data.slice(0, size)), null);
+  assert.equal(frame?.isRepeated, undefined);
+  view.setUint8(0, 3);
+  assert.deepEqual([frameOf(data)?.isRepeated, frameOf(data)?.number, frameOf(data)?.type], [true, 70000, type]);
   view.setUint8(0, 2);
   assert.equal(frameOf(data), null);
 });

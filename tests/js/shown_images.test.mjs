@@ -32,6 +32,18 @@ test("an image that is drawn again was drawn before", () => {
   assert.deepEqual(images.report("front", 1300), [7, 300]);
 });
 
+test("a newer image counts although it is older, because the camera repeats it", () => {
+  const images = new ShownImages();
+  images.show(front(7, 900), 1000);
+  images.show(front(8, 100), 1050);
+  assert.deepEqual(images.report("front", 1050), [8, 0]);
+  assert.equal(images.share(SIGHT, 1050), 0);
+  images.clear();
+  images.show(front(2 ** 32 - 1, 100), 1100);
+  images.show(front(0, 90), 1150);
+  assert.deepEqual(images.report("front", 1150), [0, 0], "the numbers begin again");
+});
+
 test("of two widgets with one camera, the one with the newer image counts", () => {
   const images = new ShownImages();
   images.show(front(8, 950), 1000);

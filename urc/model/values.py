@@ -221,6 +221,9 @@ class Signal(NamedTuple):
     """Change of the formula's result to `frame`; None means no change."""
     has_capture_time: bool = True
     """Whether the time of capture in an image's message can make the image older."""
+    frozen_after_s: float = 0.0
+    """Time in seconds after which images with the same bytes count as one old image; 0 means
+    never."""
 
     @property
     def inputs(self) -> frozenset[str]:

@@ -19,6 +19,7 @@ from urc.model.payload import Envelope
 from urc.model.values import Reading, Sample, Signal
 from urc.runtime.image_viewers import ImageViewers
 from urc.runtime.redaction import Redactor
+from urc.runtime.repeated_images import RepeatedImages
 from urc.runtime.running_goals import RunningGoal, RunningGoals
 from urc.runtime.topic_check import TopicMismatch
 from urc.transports.ros.topic_list import TopicList, TopicRow
@@ -303,6 +304,8 @@ class Hub:
         """Number of traffic readers; traffic is recorded only if this number is above 0."""
         self.viewers = ImageViewers()
         """Number of viewers of each image; a tap counts as a viewer of all images."""
+        self.repeated = RepeatedImages(signals)
+        """Images that a camera repeats; empty unless a signal declares ``frozen_after``."""
         self.streams = SampleHistory()
         """Recent readings of the signals that keep every reading; empty by default."""
         self._latest: dict[str, Sample] = {}
@@ -318,6 +321,10 @@ class Hub:
         if self._redactor is not None:
             value = self._redactor.value
             taken = tuple(one._replace(value=value(one.value)) for one in taken)
+        if self.repeated:
+            taken, notes = self.repeated.aged(taken)
+            for name, text in notes:
+                self.log(LogEntry(taken[-1].time_s, "warning", name, text))
         revision = self.revision = self.revision + 1
         for sample in taken:
             self._latest[sample.signal] = sample

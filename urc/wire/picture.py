@@ -2,7 +2,8 @@
 
 Layer 3½. Pure. An image, or other bytes::
 
-    0  u8   1: an image             4  u32  its age in milliseconds at the moment of encoding
+    0  u8   1: an image; 3: an      4  u32  its age in milliseconds at the moment of encoding
+            image that is repeated
     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
     2  u16  index of the signal    16  u32  number of the image
                                    20       media type in ASCII, then the bytes
@@ -22,12 +23,22 @@ from typing import Final, NamedTuple
 
 from urc.video import VideoUnit, encode_unit, read_unit
 
-__all__ = ["PICTURE", "PICTURE_HEADER", "VIDEO", "VIDEO_HEADER", "PictureMessage", "read_picture"]
+__all__ = [
+    "PICTURE",
+    "PICTURE_HEADER",
+    "REPEATED",
+    "VIDEO",
+    "VIDEO_HEADER",
+    "PictureMessage",
+    "read_picture",
+]
 
 PICTURE: Final = 1
 """First byte of a message with an image, which marks its kind."""
 VIDEO: Final = 2
 """First byte of a message with an access unit."""
+REPEATED: Final = 3
+"""First byte of a message with an image that the camera repeats."""
 PICTURE_HEADER: Final = struct.Struct(">BBHIdI")
 VIDEO_HEADER: Final = struct.Struct(">BBHIdIHHB")
 
@@ -49,7 +60,7 @@ def read_picture(message: bytes) -> PictureMessage | None:
     if len(message) < PICTURE_HEADER.size:
         return None
     kind, type_length, index, age_ms, *_ = PICTURE_HEADER.unpack_from(message)
-    if kind != PICTURE:
+    if kind not in (PICTURE, REPEATED):
         return None
     return PictureMessage(index, age_ms, message[PICTURE_HEADER.size + type_length :])
 

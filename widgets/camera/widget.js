@@ -260,10 +260,12 @@ class Camera {
     const isShown = reading !== undefined && reading.value !== null;
     const nowS = performance.now() / 1000;
     const ageS = isShown ? nowS - reading.time : 0;
-    const isFrozen = isShown && ageS >= this.freeze;
+    const isRepeated = isShown && reading.image?.isRepeated === true;
+    const isFrozen = isRepeated || (isShown && ageS >= this.freeze);
     attribute(this.root, "data-frozen", isFrozen ? "yes" : null);
     const rate = this.rate && !isFrozen ? `${this.rate.perSecond(nowS).toFixed(0)} /s` : "";
-    const old = isFrozen ? `❄ ${this.t("{age} old", { age: ageText(ageS) })}` : rate;
+    const words = isRepeated ? this.t("Camera repeats the same image") : this.t("{age} old", { age: ageText(ageS) });
+    const old = isFrozen ? `❄ ${words}` : rate;
     write(this.age, isShown ? old : DASH);
   }
 

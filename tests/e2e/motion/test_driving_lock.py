@@ -58,18 +58,20 @@ SPARE: Final = WidgetUse("spare", "battery", {"level": "battery"})
 class Seeing(Wire):
     """A robot whose one command needs the images of its camera, 20 a second."""
 
-    def __init__(self, *, has_camera: bool = True) -> None:
+    def __init__(self, *, has_camera: bool = True, frozen_after_s: float = 0.0) -> None:
         # The longest lease, so that a page that stalls for a moment does not end the motion first.
         hold = Hold(0.02, {"speed": 0.0}, LONGEST_LEASE_S, sight=SIGHT)
         arguments = {"speed": number("speed", -2.0, 2.0)}
         drive = Command("drive", "wire", WriteSpec("text", {}), arguments, hold=hold)
-        signals = {"front": Signal("front", "image"), "battery": Signal("battery", "integer")}
+        front = Signal("front", "image", frozen_after_s=frozen_after_s)
+        signals = {"front": front, "battery": Signal("battery", "integer")}
         uses = (CAMERA if has_camera else SPARE, DRIVE)
         profile = dashboard_profile(uses=uses, commands={"drive": drive}, signals=signals)
         FakeRobot.__init__(self, profile)
         self.is_filming = True
+        self.is_repeating = False
         self.seen_s = 0.0
-        """Time of the newest image."""
+        """Time of the newest image that is no repetition."""
 
     async def film(self) -> None:
         """Publish an image every 50 ms, for as long as the camera films."""
@@ -77,9 +79,11 @@ class Seeing(Wire):
         while True:
             await asyncio.sleep(0.05)
             if self.is_filming:
-                images.reverse()
-                self.seen_s = self.clock.now()
-                self.hub.publish([Sample("front", images[0], self.seen_s)])
+                now_s = self.clock.now()
+                if not self.is_repeating:
+                    images.reverse()
+                    self.seen_s = now_s
+                self.hub.publish([Sample("front", images[0], now_s)])
 
     def speeds_since(self, count: int) -> list[float]:
         """Return the speeds of the frames after the first `count`."""
@@ -89,10 +93,15 @@ class Seeing(Wire):
 
 @asynccontextmanager
 async def filmed(
-    new_page: PageMaker, data: Path | None = None, *, has_camera: bool = True
+    new_page: PageMaker,
+    data: Path | None = None,
+    *,
+    has_camera: bool = True,
+    frozen_after_s: float = 0.0,
 ) -> AsyncIterator[tuple[Seeing, Page]]:
     """Serve the robot and its film; give it, and its page when it can be driven."""
-    async with driven(data, Seeing(has_camera=has_camera)) as (robot, address):
+    seeing = Seeing(has_camera=has_camera, frozen_after_s=frozen_after_s)
+    async with driven(data, seeing) as (robot, address):
         assert isinstance(robot, Seeing)
         film = asyncio.create_task(robot.film())
         try:
@@ -138,6 +147,40 @@ async def test_a_camera_that_freezes_slows_the_robot_and_stops_it_in_time(
         assert robot.speeds_since(silent) == [], "the hand that held on moves nothing"
         await page.mouse.up()
         await push_until(robot.is_moving, page, STICK)
+        await page.mouse.up()
+        await robot.until_stopped()
+
+
+async def test_a_camera_that_repeats_its_image_stops_the_robot(new_page: PageMaker) -> None:
+    """New messages arrive all the time, and the image in them is the same."""
+    async with filmed(new_page, frozen_after_s=1.0) as (robot, page):
+        badge = page.locator(".camera-age")
+        await push_until(robot.is_moving, page, STICK)
+        robot.is_repeating = True
+        late_s = await stopped_after(robot)
+        assert SIGHT.stop_after_s - 0.2 < late_s < SIGHT.stop_after_s + MARGIN_S
+        await expect(badge).to_contain_text("Camera repeats the same image")
+        await expect(page.locator(NOTE)).to_contain_text("Image too old")
+        robot.is_repeating = False
+        await expect(badge).not_to_contain_text("same image")
+        silent = len(robot.line.texts)
+        await asyncio.sleep(0.4)
+        assert robot.speeds_since(silent) == [], "the hand that held on moves nothing"
+        await page.mouse.up()
+        await push_until(robot.is_moving, page, STICK)
+        await page.mouse.up()
+        await robot.until_stopped()
+
+
+async def test_repeated_images_count_as_new_without_the_key(new_page: PageMaker) -> None:
+    async with filmed(new_page) as (robot, page):
+        robot.is_repeating = True
+        await push_until(robot.is_moving, page, STICK)
+        count = len(robot.line.texts)
+        await asyncio.sleep(SIGHT.stop_after_s + 0.5)
+        speeds = robot.speeds_since(count)
+        assert robot.is_moving()
+        assert min(speeds[3:]) == max(speeds[3:]), "nor does it become slower"
         await page.mouse.up()
         await robot.until_stopped()
 

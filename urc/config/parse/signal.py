@@ -67,6 +67,7 @@ def parse_signal(part: Node, title: str, problems: Problems) -> Signal:
         frame=frame,
         transform=parse_frame_change(part, frame, kind, problems),
         has_capture_time=_has_capture_time(part, kind, problems),
+        frozen_after_s=_frozen_after_s(part, kind, problems),
     )
 
 
@@ -209,6 +210,22 @@ def _has_capture_time(part: Node, kind: str, problems: Problems) -> bool:
             hint="this key needs 'type: image' or 'type: video'",
         )
     return part.flag("capture_time", default=True)
+
+
+def _frozen_after_s(part: Node, kind: str, problems: Problems) -> float:
+    if kind != "image" and "frozen_after" in part.data:
+        is_video = kind == "video"
+        problems.error(
+            part,
+            "misplaced-key",
+            f"'frozen_after' has no effect for type {kind}",
+            at="frozen_after",
+            key=True,
+            hint="the data of a video differ, even if all its images are the same"
+            if is_video
+            else "this key needs 'type: image'",
+        )
+    return problems.duration(part, "frozen_after", 0.0, least=0.2, most=60)
 
 
 def _formula(part: Node, problems: Problems) -> Template | None:

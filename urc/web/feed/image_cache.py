@@ -94,7 +94,8 @@ class ImageCache:
             return known
         age_s, index = now_s - sample.time_s, self._hub.index[name]
         message = encode_picture(
-            index, sample.value, number, round(age_s * 1000), round(now_s * 1000)
+            *(index, sample.value, number, round(age_s * 1000), round(now_s * 1000)),
+            is_repeated=name in self._hub.repeated,
         )
         made = self._encoded[name] = EncodedImage(as_frame(message), sample, number, now_s)
         return made

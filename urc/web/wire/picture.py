@@ -9,7 +9,7 @@ All clients receive identical bytes, so the WebSocket frame is built only once. 
 
 from urc.images import media_type
 from urc.video import VideoUnit
-from urc.wire.picture import PICTURE, PICTURE_HEADER, VIDEO, VIDEO_HEADER
+from urc.wire.picture import PICTURE, PICTURE_HEADER, REPEATED, VIDEO, VIDEO_HEADER
 
 __all__ = ["NUMBERS", "as_frame", "encode_picture", "encode_video"]
 
@@ -22,7 +22,9 @@ _SHORT, _MEDIUM = 126, 1 << 16
 other lengths need nine bytes."""
 
 
-def encode_picture(index: int, data: bytes, number: int, age_ms: int, now_ms: int) -> bytes:
+def encode_picture(
+    index: int, data: bytes, number: int, age_ms: int, now_ms: int, *, is_repeated: bool = False
+) -> bytes:
     """Return the binary message with an image.
 
     Args:
@@ -31,11 +33,13 @@ def encode_picture(index: int, data: bytes, number: int, age_ms: int, now_ms: in
         number: number of the image, by which a page names it.
         age_ms: age of the image at `now_ms`, in milliseconds.
         now_ms: time on the server's clock, in milliseconds.
+        is_repeated: whether the camera repeats the image.
     """
     kind = media_type(data).encode("ascii")
     age_ms = min(max(age_ms, 0), _OLDEST_MS)
     number %= NUMBERS
-    return PICTURE_HEADER.pack(PICTURE, len(kind), index, age_ms, now_ms, number) + kind + data
+    first = REPEATED if is_repeated else PICTURE
+    return PICTURE_HEADER.pack(first, len(kind), index, age_ms, now_ms, number) + kind + data
 
 
 def encode_video(index: int, unit: VideoUnit, number: int, age_ms: int, now_ms: int) -> bytes:

@@ -31,8 +31,11 @@ export class ShownImages {
    */
   show({ signal, number, timeMs }, nowMs) {
     const known = this.images.get(signal);
-    // Of two widgets with the same camera, the one with the newer image counts.
-    if (known && (known.number === number || known.timeMs > timeMs)) return;
+    if (known?.number === number) return;
+    // Of two widgets with the same camera, the one with the newer image counts. A newer image can have an
+    // earlier time: the camera may repeat its last image. Numbers begin again at 2^32.
+    const isBehind = known && ((number - known.number) | 0) < 0;
+    if (isBehind && known.timeMs > timeMs) return;
     this.images.set(signal, { signal, number, timeMs, atMs: nowMs });
   }
 

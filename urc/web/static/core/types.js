@@ -50,6 +50,7 @@
  * @property {string} signal
  * @property {number} number Number of the image on the server.
  * @property {number} timeMs Time of the image on this page's clock.
+ * @property {boolean | undefined} [isRepeated] Whether the camera repeats the image.
  *
  * @typedef {object} VideoImage A decoded image of a video.
  * @property {ImageBitmap} bitmap Closed as soon as the next image is stored; copy it to keep it.

@@ -3,7 +3,8 @@
  * Binary messages from the server, each with one image or a signal's bytes. See
  * `urc/web/wire/picture.py`.
  *
- *     0  u8   1: an image             4  u32  its age in milliseconds at the moment of sending
+ *     0  u8   1: an image; 3: an      4  u32  its age in milliseconds at the moment of sending
+ *             image that is repeated
  *     1  u8   length of the type      8  f64  the server's clock then, in milliseconds
  *     2  u16  index of the signal    16  u32  number of the image
  *                                    20       media type in ASCII, then the bytes
@@ -15,6 +16,7 @@
  * @property {number} number Number of the image; those of one video are consecutive.
  * @property {string} type media type, or the codec string of a video
  * @property {Uint8Array<ArrayBuffer>} bytes
+ * @property {boolean | undefined} [isRepeated] Whether the camera repeats the image.
  * @property {VideoPart} [video] Only for an access unit.
  *
  * @typedef {object} VideoPart
@@ -25,6 +27,7 @@
 
 const PICTURE = 1;
 const VIDEO = 2;
+const REPEATED = 3;
 const HEADER = 20;
 const VIDEO_HEADER = 25;
 
@@ -36,7 +39,7 @@ export function frameOf(data) {
   if (data.byteLength < HEADER) return null;
   const view = new DataView(data);
   const [kind, typeLength] = [view.getUint8(0), view.getUint8(1)];
-  if (kind !== PICTURE && kind !== VIDEO) return null;
+  if (kind !== PICTURE && kind !== VIDEO && kind !== REPEATED) return null;
   const header = kind === VIDEO ? VIDEO_HEADER : HEADER;
   if (data.byteLength < header + typeLength) return null;
   const letters = new Uint8Array(data, header, typeLength);
@@ -49,6 +52,7 @@ export function frameOf(data) {
     bytes: new Uint8Array(data, header + typeLength),
   };
   if (kind === PICTURE) return frame;
+  if (kind === REPEATED) return { ...frame, isRepeated: true };
   const video = {
     width: view.getUint16(20),
     height: view.getUint16(22),

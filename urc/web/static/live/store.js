@@ -155,12 +155,13 @@ export class Store {
    * @param {import("./frames.js").BinaryFrame} frame
    * @param {number} nowMs
    */
-  picture({ index, sentMs, ageMs, number, type, bytes }, nowMs) {
+  picture({ index, sentMs, ageMs, number, type, bytes, isRepeated }, nowMs) {
     const timeMs = nowMs - this.lagMs(sentMs, nowMs) - ageMs;
     const name = this.names[index];
     if (name === undefined) return;
     this.serial += 1;
-    const image = { blob: new Blob([bytes], { type }), type, serial: this.serial, signal: name, number, timeMs };
+    const blob = new Blob([bytes], { type });
+    const image = { blob, type, serial: this.serial, signal: name, number, timeMs, isRepeated };
     const value = { bytes: bytes.byteLength };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, image });
   }
