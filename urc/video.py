@@ -14,13 +14,14 @@ import re
 import struct
 from typing import Final, NamedTuple
 
-__all__ = ["MAX_UNIT_BYTES", "VideoUnit", "encode_unit", "read_unit"]
+__all__ = ["MAX_UNIT_BYTES", "VideoUnit", "encode_unit", "read_unit", "with_time"]
 
 MAX_UNIT_BYTES: Final = 4_194_304
 """Maximum size of an access unit, in bytes; a keyframe of a 4K camera has about 1 MB."""
 
 _SIGN: Final = b"URCV"
 _HEADER: Final = struct.Struct(">4sBBHHd")
+_TIME: Final = struct.Struct(">d")
 _CODEC: Final = re.compile(rb"[A-Za-z0-9.]{3,40}")
 
 
@@ -44,6 +45,12 @@ def encode_unit(unit: VideoUnit) -> bytes:
     codec = unit.codec.encode("ascii")
     head = _HEADER.pack(_SIGN, unit.is_key, len(codec), unit.width, unit.height, unit.time_s)
     return head + codec + unit.data
+
+
+def with_time(value: bytes, time_s: float) -> bytes:
+    """Return an access unit in a signal's value with another time of arrival."""
+    place = _HEADER.size - _TIME.size
+    return value[:place] + _TIME.pack(time_s) + value[_HEADER.size :]
 
 
 def read_unit(value: bytes) -> VideoUnit | None:

@@ -26,7 +26,7 @@ FLOORS = {
     "source": 1, "registry": 1, "shipped": 1, "private_files": 1, "expressions": 1, "patterns": 1,
     "key_expressions": 1,
     "ros_names": 1,
-    "images": 1, "video": 1, "capture_clock": 1,
+    "images": 1, "video": 1, "capture_clock": 1, "video_reader": 1.5,
     "filters": 0,  # of expressions, which stand on them
     "problems": -1,  # the ground: every error of ours is an UrcError, so all may stand on it
 }  # fmt: skip

@@ -5,7 +5,8 @@
 
 from typing import Final, NamedTuple
 
-__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "VIDEO_LINES", "MessageTransportRules"]
+__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "VIDEO_LINES", "VIDEO_TYPES"]
+__all__ += ["MessageTransportRules"]
 
 
 class MessageTransportRules(NamedTuple):
@@ -28,5 +29,11 @@ MESSAGING: Final = {
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket", "camera"))
 VIDEO_LINES: Final = frozenset(("camera",))
 """Transport types that deliver only access units of a video, and accept no data."""
+VIDEO_TYPES: Final = {
+    "foxglove.CompressedVideo",
+    "ffmpeg_image_transport_msgs/FFMPEGPacket",
+    "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
+}
+"""Types of messages over ``ros`` that contain an access unit of a video."""
 CARRIERS: Final = frozenset(("ssh",))
 """Transport types that can be tunnels."""

@@ -18,6 +18,7 @@ from urc.model.values import NOTHING, Conversion, Value
 from urc.patterns import Pattern
 
 __all__ = [
+    "LOST",
     "NUMBERED",
     "RESTARTED",
     "UNKNOWN_END",
@@ -56,6 +57,9 @@ RESTARTED: Final = "restarted"
 went back. The body is one line of text about it; "" if the step is not worth a line."""
 UNKNOWN_END: Final = "is_end_unknown"
 """Attribute of a response that reports a failure: true if the robot may still follow the goal."""
+LOST: Final = "lost"
+"""The attribute of a message that is true if messages of its topic were lost before it. Only
+transports of ROS set it, and only for the topics of videos."""
 NUMBERED: Final = frozenset(("call", "goal", "request", "get"))
 """Verbs of requests. The ``response`` to a request has the request's ``id``."""
 

@@ -23,10 +23,9 @@ from collections.abc import Iterable
 from io import RawIOBase
 from typing import Any, BinaryIO, Final, NamedTuple
 
-from urc._h264 import BadStream, StreamInfo, info_of, is_keyframe, with_parameter_sets
 from urc.capture_clock import CaptureClock, step_words
-from urc.images import MAX_PIXELS
-from urc.video import MAX_UNIT_BYTES, VideoUnit, encode_unit
+from urc.video import VideoUnit, encode_unit
+from urc.video_reader import UnitReader, VideoFault
 
 __all__ = [
     "FAULT",
@@ -34,10 +33,8 @@ __all__ = [
     "RECORD",
     "UNIT",
     "CapturedUnits",
-    "DemuxFault",
     "DemuxJob",
     "UnitQueue",
-    "UnitReader",
     "capture_s",
     "main",
 ]
@@ -51,7 +48,6 @@ QUEUE_UNITS: Final = 240
 """Maximum number of queued access units: the oldest group of pictures is dropped first."""
 MEMORY_BYTES: Final = 2**31
 """Address space of this process; the libraries need 0.5 GB of it before they start."""
-NO_KEYFRAME_S: Final = 20.0
 PROBE_BYTES: Final = 500_000
 PROBE_US: Final = 500_000
 """Data and time for the detection of the stream's format."""
@@ -65,10 +61,6 @@ _OLDEST_S: Final = 50.0
 _REFERENCE: Final = struct.Struct("=q")
 _CODECS: Final = {"h264": False, "hevc": True}
 """Whether the codec is H.265, keyed by the library's name."""
-
-
-class DemuxFault(Exception):
-    """Raised for a stream that cannot be used, with a message in one line."""
 
 
 class DemuxJob(NamedTuple):
@@ -144,64 +136,6 @@ class UnitQueue:
         with self._changed:
             self._is_over = True
             self._changed.notify()
-
-
-class UnitReader:
-    """Turns the packets of one stream into access units, and checks them."""
-
-    def __init__(self, *, is_hevc: bool, extra: bytes = b"", began_s: float) -> None:
-        """Create a reader.
-
-        Args:
-            is_hevc: whether the stream is H.265 instead of H.264.
-            extra: parameter sets that the container states separately.
-            began_s: time of the first packet, in seconds.
-        """
-        self._is_hevc = is_hevc
-        self._extra = extra
-        self._key_s = began_s
-        """Time of the newest keyframe."""
-        self._info: StreamInfo | None = None
-
-    def unit(self, data: bytes, now_s: float) -> VideoUnit | None:
-        """Return a packet as an access unit; None before the first keyframe.
-
-        Raises:
-            DemuxFault: the stream exceeds a limit, or has no keyframes.
-        """
-        if len(data) > MAX_UNIT_BYTES:
-            raise DemuxFault(
-                f"an encoded image has {len(data)} bytes; the limit is {MAX_UNIT_BYTES}:"
-                " lower the bit rate in the camera's settings"
-            )
-        is_key = is_keyframe(data, is_hevc=self._is_hevc)
-        if is_key:
-            self._key_s = now_s
-            data = with_parameter_sets(data, self._extra, is_hevc=self._is_hevc)
-        elif now_s - self._key_s > NO_KEYFRAME_S:
-            raise DemuxFault(
-                f"no keyframe within {NO_KEYFRAME_S:g} s: set a keyframe interval of 1 s in the"
-                " camera's settings"
-            )
-        self._take_info(data)
-        if self._info is None:
-            return None
-        codec, width, height = self._info
-        return VideoUnit(codec, is_key, width, height, now_s, data)
-
-    def _take_info(self, data: bytes) -> None:
-        try:
-            found = info_of(data, is_hevc=self._is_hevc)
-        except BadStream as fault:
-            raise DemuxFault(f"the camera's stream is damaged: {fault}") from fault
-        if found is None:
-            return
-        if found.width * found.height > MAX_PIXELS:
-            raise DemuxFault(
-                f"the camera sends images of {found.width} by {found.height} pixels; the limit is"
-                f" {MAX_PIXELS} in total: select a smaller image in the camera's settings"
-            )
-        self._info = found
 
 
 class EarlyUnits:
@@ -281,7 +215,7 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
     """Read a stream until its end, and put its access units into a queue.
 
     Raises:
-        DemuxFault: the stream ended or cannot be used.
+        VideoFault: the stream ended or cannot be used.
     """
     import av  # the extra `video`: takes 150 ms
 
@@ -290,18 +224,18 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
         with _opened(av, job, source) as container:
             found = container.streams.video
             if not found:
-                raise DemuxFault("the camera's stream contains no video")
+                raise VideoFault("the camera's stream contains no video")
             stream = found[0]
             name = stream.codec_context.name
             if name not in _CODECS:
-                raise DemuxFault(
+                raise VideoFault(
                     f"the camera sends {name}; URC supports H.264 and H.265: select one of them in"
                     " the camera's settings"
                 )
             _read_stream(av, container, stream, queue, early, is_hevc=_CODECS[name])
     except av.error.FFmpegError as fault:
-        raise DemuxFault(_words(av, fault)) from fault
-    raise DemuxFault("the camera ended the stream")
+        raise VideoFault(_words(av, fault)) from fault
+    raise VideoFault("the camera ended the stream")
 
 
 def _opened(av: Any, job: DemuxJob, source: RawIOBase) -> Any:
@@ -433,7 +367,7 @@ def main() -> int:
         threading.Thread(target=_end_with, args=(source,), daemon=True).start()
     try:
         read_units(job, source, queue)
-    except DemuxFault as fault:
+    except VideoFault as fault:
         queue.put(_record(FAULT, str(fault).encode()), is_key=True)
     except MemoryError:
         queue.put(_record(FAULT, b"the stream needs too much memory"), is_key=True)

@@ -8,7 +8,7 @@ its newest messages. Responses are queued separately, because a lost response is
 import asyncio
 from collections import deque
 
-from urc.model.payload import Envelope
+from urc.model.payload import LOST, Envelope
 from urc.transports.base import PeerClosed
 
 __all__ = ["TopicReceiveQueue"]
@@ -44,6 +44,8 @@ class TopicReceiveQueue:
         self._answers: dict[int, int] = {}
         """Size of each queued response in bytes, keyed by sequence number."""
         self._answers_bytes = 0
+        self._ordered: dict[str, bool] = {}
+        """Whether messages were lost before the next one, keyed by the topics of videos."""
         self._number = 0
         self._arrived = asyncio.Event()
         self._ended: str | None = None
@@ -58,6 +60,13 @@ class TopicReceiveQueue:
         Envelopes that URC itself makes are queued without a call of this method.
         """
         self.arrivals += 1
+
+    def keep_groups(self, topic: str) -> None:
+        """Mark the next message of a topic, and each message after a loss, with `LOST`.
+
+        A video needs the mark: after a loss, its images can be decoded only from a keyframe on.
+        """
+        self._ordered[topic] = True
 
     def message(self, topic: str, envelope: Envelope, size_bytes: int) -> None:
         """Add a message of `topic`; drop the oldest messages if a limit is exceeded."""
@@ -112,10 +121,14 @@ class TopicReceiveQueue:
             await self._arrived.wait()
         number = next(iter(self._waiting))
         envelope = self._waiting.pop(number)
-        if envelope.verb == "message":
-            self._forget(str(envelope.attributes["topic"]))
-        else:
+        if envelope.verb != "message":
             self._answers_bytes -= self._answers.pop(number)
+            return envelope
+        topic = str(envelope.attributes["topic"])
+        self._forget(topic)
+        if self._ordered.get(topic):
+            self._ordered[topic] = False
+            return envelope._replace(attributes={**envelope.attributes, LOST: True})
         return envelope
 
     def _add(self, envelope: Envelope) -> int:
@@ -129,6 +142,8 @@ class TopicReceiveQueue:
         del self._waiting[number]
         self._forget(topic)
         self.dropped += 1
+        if topic in self._ordered:
+            self._ordered[topic] = True
 
     def _drop_oldest(self) -> None:
         for number, envelope in self._waiting.items():

@@ -1,19 +1,23 @@
 """Messages in Protocol Buffers and FlatBuffers, from the server of the Foxglove SDK."""
 
 import asyncio
+import io
 import math
 import struct
 import time
 from base64 import b64decode
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+import av
+import numpy as np
 import pytest
 from foxglove import Channel, MessageSchema, Schema, Service, ServiceRequest, ServiceSchema
 from foxglove.channels import (
     CompressedImageChannel,
+    CompressedVideoChannel,
     FrameTransformChannel,
     LaserScanChannel,
     LogChannel,
@@ -23,6 +27,7 @@ from foxglove.channels import (
 )
 from foxglove.messages import (
     CompressedImage,
+    CompressedVideo,
     FrameTransform,
     LaserScan,
     Log,
@@ -38,16 +43,20 @@ from foxglove.messages import (
 )
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame as GooglePose
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3 as GoogleVector
+from rosbags.typesys import get_types_from_msg
 
 import urc
+from bench.rig.ros_messages import ROS2
 from tests.e2e.transports.peers.foxglove import FoxgloveRobot
 from tests.e2e.transports.ros_bases import picture
 from tests.unit.protocol.flatbuffer import messages as flat
 from tests.unit.protocol.protobuf.messages import schema_of
 from urc.client.local import ConnectedRobot
 from urc.client.stick import MotionEnded
+from urc.model.values import Sample
 from urc.problems import UrcError
 from urc.protocol.values.point_cloud import read_cloud
+from urc.video import VideoUnit, read_unit
 
 pytestmark = pytest.mark.anyio
 
@@ -243,6 +252,128 @@ async def test_an_image_that_waited_in_the_robot_is_older_than_its_arrival(
         captured_s = time.time()
         await asyncio.sleep(2.0)
         assert await age_s(captured_s) > 1.9
+
+
+FILM = """
+urc: 1
+kind: robot
+name: filmer
+title: Filmer
+settings: { port: { type: port, required: true } }
+transports:
+  ros: { type: ros, via: auto, host: 127.0.0.1, port: "{{ settings.port }}" }
+signals:
+  film: { type: video }
+  raw: { type: video }
+messages:
+  film: { subscribe: { topic: /film, type: foxglove.CompressedVideo }, json: { film: "@" } }
+  raw:
+    subscribe: { topic: /raw, type: ffmpeg_image_transport_msgs/FFMPEGPacket }
+    json: { raw: "@" }
+commands:
+  drive:
+    args: { speed: { min: -1, max: 1, default: 0 } }
+    send: { publish: { topic: /cmd, type: foxglove.Vector3, json: { x: "{{ speed }}" } } }
+    hold: { repeat: 50ms, release: { speed: 0 }, watchdog: none }
+"""
+"""The robot moves, so its guard passes the messages on."""
+PACKET = "ffmpeg_image_transport_msgs/msg/FFMPEGPacket"
+PACKET_TEXT = """\
+std_msgs/Header header
+int32 width
+int32 height
+string encoding
+uint64 pts
+uint8 flags
+bool is_bigendian
+uint8[] data
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+"""As ffmpeg_image_transport_msgs 1.1 defines it."""
+
+
+def packet_of(data: bytes, number: int) -> bytes:
+    """Return an FFMPEGPacket in CDR, written by rosbags."""
+    if PACKET not in ROS2.types:
+        ROS2.register(get_types_from_msg(PACKET_TEXT.partition("=====")[0], PACKET))
+    types = ROS2.types
+    at_s = time.time()
+    stamp = types["builtin_interfaces/msg/Time"](sec=int(at_s), nanosec=int(at_s % 1 * 1e9))
+    header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="eye")
+    packet = types[PACKET](
+        header, 320, 240, "h264", number, int(number % 10 == 0), False,
+        np.frombuffer(data, np.uint8),
+    )  # fmt: skip
+    return bytes(ROS2.serialize_cdr(packet, PACKET))
+
+
+def film() -> list[bytes]:
+    """Return the access units of a film, with a keyframe in each group of ten."""
+    target = io.BytesIO()
+    with av.open(target, "w", format="h264") as container:
+        options = {"preset": "ultrafast", "tune": "zerolatency"}
+        stream = container.add_stream("libx264", rate=30, options=options)
+        assert isinstance(stream, av.VideoStream)
+        stream.width, stream.height, stream.pix_fmt, stream.gop_size = 320, 240, "yuv420p", 10
+        packets = []
+        for number in range(60):
+            grey = np.full((240, 320, 3), 4 * number, np.uint8)
+            packets += stream.encode(av.VideoFrame.from_ndarray(grey, "rgb24"))
+        packets += stream.encode(None)
+        return [bytes(packet) for packet in packets]
+
+
+@pytest.mark.parametrize("name", ["film", "raw"])
+async def test_a_video_in_messages_arrives_in_whole_groups(
+    tmp_path: Path, rover: FoxgloveRobot, name: str
+) -> None:
+    """From a keyframe on, unchanged, and in an order that a decoder can follow."""
+    file = tmp_path / "filmer.yaml"
+    file.write_text(FILM, "utf-8")
+    units, found = film(), list[VideoUnit]()
+    channel = CompressedVideoChannel("/film", context=rover.context) if name == "film" else None
+
+    def send(number: int) -> None:
+        data = units[number % len(units)]
+        if channel is None:
+            rover.publish("/raw", PACKET, packet_of(data, number), PACKET_TEXT)
+            return
+        at_s = time.time()
+        stamp = Timestamp(sec=int(at_s), nsec=int(at_s % 1 * 1e9))
+        channel.log(CompressedVideo(timestamp=stamp, frame_id="eye", data=data, format="h264"))
+
+    def hear(samples: Sequence[Sample]) -> None:
+        for one in samples:
+            unit = read_unit(one.value) if isinstance(one.value, bytes) else None
+            if one.signal == name and unit is not None:
+                found.append(unit)
+
+    send(3)  # the topic begins in the middle of a group
+    async with urc.connect(urc.load(file), port=rover.port) as robot:
+        with robot.hub.passed_to(hear), robot.hub.viewers.viewing():
+            await until(lambda: f"/{name}" in rover.subscribed)
+            for number in range(4, 34):
+                send(number)
+                await asyncio.sleep(0.02)
+            await until(lambda: found and found[-1].data == units[33])
+        begin = units.index(found[0].data)
+        assert begin % 10 == 0
+        assert found[0].is_key
+        assert [one.data for one in found] == units[begin:34]
+        decoder = av.CodecContext.create("h264", "r")
+        images = [image for one in found for image in decoder.decode(av.Packet(one.data))]
+        images += decoder.decode(None)
+        assert len(images) == len(found)
+        assert {(image.width, image.height) for image in images} == {(320, 240)}
+        now_s = asyncio.get_running_loop().time()
+        assert all(0 <= now_s - one.time_s < 10 for one in found)
 
 
 async def test_messages_are_published_by_the_schema_of_the_server(

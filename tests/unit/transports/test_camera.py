@@ -11,19 +11,17 @@ from urc.images import MAX_PIXELS
 from urc.transports import camera
 from urc.transports.base import MissingPackage, Transport, TransportError, TransportSetup
 from urc.transports.camera_process import (
-    NO_KEYFRAME_S,
     NOTE,
     QUEUE_BYTES,
     RECORD,
     CapturedUnits,
-    DemuxFault,
     EarlyUnits,
     UnitQueue,
-    UnitReader,
     capture_s,
 )
 from urc.transports.camera_relay import RtspWatch
 from urc.video import MAX_UNIT_BYTES, VideoUnit
+from urc.video_reader import NO_KEYFRAME_S, UnitReader, VideoFault
 
 KEY, DELTA = b"\0\0\1\x65image", b"\0\0\1\x41change"
 
@@ -114,7 +112,7 @@ def test_an_endless_group_takes_bounded_memory() -> None:
 def test_a_stream_without_keyframes_is_ended() -> None:
     reader = UnitReader(is_hevc=False, began_s=100.0)
     assert reader.unit(DELTA, 100.0 + NO_KEYFRAME_S) is None
-    with pytest.raises(DemuxFault, match=r"^no keyframe within 20 s: set a keyframe interval of"):
+    with pytest.raises(VideoFault, match=r"^no keyframe within 20 s: set a keyframe interval of"):
         reader.unit(DELTA, 100.1 + NO_KEYFRAME_S)
 
 
@@ -130,7 +128,7 @@ def test_a_keyframe_counts_anew() -> None:
 
 def test_a_gigantic_image_is_refused_before_anything_decodes_it() -> None:
     reader = UnitReader(is_hevc=False, began_s=0.0)
-    with pytest.raises(DemuxFault) as told:
+    with pytest.raises(VideoFault) as told:
         reader.unit(baseline_sps(30_000, 30_000) + KEY, 0.0)
     assert str(told.value) == (
         f"the camera sends images of 30000 by 30000 pixels; the limit is {MAX_PIXELS} in total:"
@@ -140,7 +138,7 @@ def test_a_gigantic_image_is_refused_before_anything_decodes_it() -> None:
 
 def test_a_gigantic_access_unit_is_refused() -> None:
     reader = UnitReader(is_hevc=False, began_s=0.0)
-    with pytest.raises(DemuxFault, match=r"^an encoded image has 4194305 bytes; the limit is"):
+    with pytest.raises(VideoFault, match=r"^an encoded image has 4194305 bytes; the limit is"):
         reader.unit(bytes(MAX_UNIT_BYTES + 1), 0.0)
 
 

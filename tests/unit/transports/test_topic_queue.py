@@ -2,7 +2,7 @@
 
 import asyncio
 
-from urc.model.payload import Envelope
+from urc.model.payload import LOST, Envelope
 from urc.transports.topic_queue import (
     ALL_BYTES,
     ANSWERS,
@@ -84,3 +84,35 @@ def test_answers_are_never_given_up_for_messages() -> None:
     queue.message("a", message("a", -1), 1)
     assert queue.dropped == 1
     assert taken(queue, ANSWERS + 1) == [*range(ANSWERS), -1]
+
+
+def lost(queue: TopicReceiveQueue, count: int) -> list[tuple[object, bool]]:
+    async def take() -> list[tuple[object, bool]]:
+        found = [await queue.pop() for _ in range(count)]
+        return [(one.body, bool(one.attributes.get(LOST))) for one in found]
+
+    return asyncio.run(take())
+
+
+def test_a_video_is_told_of_each_loss_and_other_topics_are_not() -> None:
+    queue = TopicReceiveQueue()
+    queue.keep_groups("film")
+    for number in range(3):
+        queue.message("film", message("film", number), 100)
+        queue.message("odom", message("odom", number), 100)
+    assert lost(queue, 6) == [(0, True), *[(n, False) for n in (0, 1, 1, 2, 2)]]
+    for number in range(3, 3 + TOPIC_MESSAGES + 2):
+        queue.message("film", message("film", number), 100)
+    assert lost(queue, 3) == [(5, True), (6, False), (7, False)]
+    queue.keep_groups("film")  # a pause and a new subscription
+    assert lost(queue, 2) == [(8, True), (9, False)]
+
+
+def test_a_video_whose_messages_are_larger_than_the_queue_is_told_too() -> None:
+    queue = TopicReceiveQueue()
+    queue.keep_groups("film")
+    queue.message("film", message("film", 0), TOPIC_BYTES)
+    assert lost(queue, 1) == [(0, True)]
+    for number in (1, 2):
+        queue.message("film", message("film", number), TOPIC_BYTES)
+    assert lost(queue, 1) == [(2, True)]

@@ -1,17 +1,20 @@
 """Checks whether messages fit the type of their transport."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 from urc.config.form_table import WRITE_FORMS
 from urc.config.link.keys import check_key, check_sent_keys
-from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_LINES
+from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_LINES, VIDEO_TYPES
 from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Driver, TransportSpec
+from urc.model.payload import ReadSpec
+from urc.model.values import Signal
 
 __all__ = ["check_messages", "check_via"]
 
 _VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
+_NONE = Signal("")
 _ANSWERED = ("call", "goal", "request", "get")
 
 
@@ -20,7 +23,7 @@ def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
     for name, inner in part.named("messages").items():
         spec = driver.transports.get(driver.messages[name].transport)
         _check_read(inner, spec, problems, wants_topic=True)
-        _check_video(inner, spec, driver, driver.messages[name].read.fields, problems)
+        _check_video(inner, spec, driver, driver.messages[name].read, problems)
         _check_answer(inner.get("acknowledge"), spec, problems)
     for place, inner in _requests(part):
         spec = driver.transports.get(_target(place, driver))
@@ -48,13 +51,13 @@ def _check_video(
     part: Node,
     spec: TransportSpec | None,
     driver: Driver,
-    fields: Collection[str],
+    read: ReadSpec,
     problems: Problems,
 ) -> None:
     """Report a camera's message that sets no video, and a video from another transport."""
     if spec is None:
         return
-    signals = [driver.signals[name] for name in fields if name in driver.signals]
+    signals = [driver.signals[name] for name in read.fields if name in driver.signals]
     is_video = [one.type == "video" for one in signals]
     if spec.type in VIDEO_LINES and not ("raw" in part.data and is_video and all(is_video)):
         problems.error(
@@ -64,6 +67,8 @@ def _check_video(
             key=True,
             hint="write raw: NAME, where the signal NAME has type: video",
         )
+    elif spec.type == "ros" and any(is_video):
+        _check_video_message(part, read, driver, problems)
     elif spec.type not in VIDEO_LINES and any(is_video) and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,
@@ -72,6 +77,33 @@ def _check_video(
             key=True,
             hint="declare a transport of type: camera, and the signal of this message as an image",
         )
+
+
+def _check_video_message(part: Node, read: ReadSpec, driver: Driver, problems: Problems) -> None:
+    """Report a video that is not the whole message of a known type, or whose parts are dropped."""
+    paths = read.options.get("paths")
+    found = paths if read.form == "json" and isinstance(paths, Mapping) else {}
+    videos = [name for name in read.fields if driver.signals.get(name, _NONE).type == "video"]
+    if read.listen.get("type") not in VIDEO_TYPES or any(found.get(one) != () for one in videos):
+        problems.error(
+            part,
+            "wrong-form",
+            "a video over ros is the whole message of a known type",
+            key=True,
+            hint="write type: foxglove.CompressedVideo or ffmpeg_image_transport_msgs/FFMPEGPacket,"
+            ' and json: { NAME: "@" }',
+        )
+    listen = part.get("subscribe")
+    for key in ("throttle", "queue_length"):
+        if listen is not None and key in listen.data:
+            problems.error(
+                listen,
+                "misplaced-key",
+                f"{key!r} would drop parts of the video",
+                at=key,
+                key=True,
+                hint="remove it: URC drops whole groups of pictures if it falls behind",
+            )
 
 
 def _check_answer(part: Node | None, spec: TransportSpec | None, problems: Problems) -> None:

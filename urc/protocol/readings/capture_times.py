@@ -9,11 +9,13 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from urc.capture_clock import CaptureClock, step_words
-from urc.model.payload import Payload, ReadSpec
+from urc.model.payload import LOST, Payload, ReadSpec
 from urc.model.text import JsonPath
 from urc.model.values import Sample, Signal
 from urc.protocol.readings.readings import Decode
 from urc.protocol.values.payload import Frame, PayloadReader
+from urc.protocol.values.video_message import GAP
+from urc.video import read_unit, with_time
 
 __all__ = ["StampedReader", "capture_paths", "dating", "stamp_s", "with_captures"]
 
@@ -60,7 +62,10 @@ def _hidden(name: str, place: int) -> str:
 
 
 class StampedReader:
-    """A reader for a message with hidden fields, which alone are no match."""
+    """A reader for a message with hidden fields, which alone are no match.
+
+    A hidden field also tells whether messages were lost before this one.
+    """
 
     def __init__(self, reader: PayloadReader) -> None:
         self._reader = reader
@@ -70,7 +75,7 @@ class StampedReader:
         found = self._reader.read(frame)
         if found is None or all(name.startswith(_HIDDEN) for name in found):
             return None
-        return found
+        return {**found, GAP: True} if frame.attributes.get(LOST) else found
 
     def write(self, fields: Mapping[str, object]) -> Payload:
         """Return a frame with `fields`; raise `NotWritable` if impossible."""
@@ -104,7 +109,12 @@ def dating(
         age = clocks.setdefault(name, CaptureClock()).age(captured_s, now)
         if age.step_s:
             note(f"{name}: {step_words(age.step_s)}")
-        return sample._replace(time_s=sample.time_s - age.older_s) if age.older_s else sample
+        if not age.older_s:
+            return sample
+        value, time_s = sample.value, sample.time_s - age.older_s
+        if isinstance(value, bytes) and read_unit(value) is not None:
+            value = with_time(value, time_s)
+        return sample._replace(value=value, time_s=time_s)
 
     def decode_dated(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
         samples, refused = decode(found, now)

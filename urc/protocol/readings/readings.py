@@ -17,6 +17,7 @@ from urc.protocol.values.convert import BadValue
 from urc.protocol.values.decode import Convert, build_converter
 from urc.protocol.values.occupancy_grid import GridConverter
 from urc.protocol.values.transform_tree import NotConnected
+from urc.protocol.values.video_message import GAP, VideoConverter, Waiting
 
 __all__ = ["Decode", "Readings"]
 
@@ -95,16 +96,22 @@ class Readings:
             others = self.decoder([name for name in names if name != tree.name])
             return self._tree_decoder(tree, others, topic.split("/")[-1] == STATIC_TOPIC)
         converters = {name: self._converter(name) for name in names}
+        videos = {name: one for name, one in converters.items() if isinstance(one, VideoConverter)}
 
         def decode(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
             samples: list[Sample] = []
             refused: list[str] = []
+            if videos and GAP in found:
+                for video in videos.values():
+                    video.lose()
             for name, raw in found.items():
                 convert = converters.get(name)
                 if convert is None:
                     continue
                 try:
-                    value = convert(raw)
+                    value = videos[name].take(raw, now) if name in videos else convert(raw)
+                except Waiting:
+                    continue
                 except BadValue as error:
                     refused.append(f"{name}: {error}")
                 else:

@@ -77,7 +77,8 @@ class RequestCompiler:
             matchers = [self._message(one.read, context) for one in messages]
             captures = self._captures(spec, messages)
             if any(captures) or any(
-                one.acknowledge or one.log or one.read.collects for one in messages
+                one.acknowledge or one.log or one.read.collects or self._is_video(one.read)
+                for one in messages
             ):
                 self._react(spec, messages, matchers, captures, context)
             else:
@@ -94,6 +95,13 @@ class RequestCompiler:
         has_hashes = filled(spec.options.get("via"), {"settings": settings}) == "zenoh"
         paths = paths_by_topic(self._driver, spec.name, settings)
         return TopicCodec(paths, is_ros1=spec.options.get("version") == 1, has_hashes=has_hashes)
+
+    def _is_video(self, read: ReadSpec) -> bool:
+        """Return whether a message contains a video, in another form than a camera's."""
+        signals = self._driver.signals
+        return read.form == "json" and any(
+            signals[name].type == "video" for name in read.fields if name in signals
+        )
 
     def _captures(
         self, spec: TransportSpec, messages: list[Message]
@@ -121,7 +129,7 @@ class RequestCompiler:
         clocks: dict[str, CaptureClock] = {}
         for place, (one, matcher) in enumerate(zip(messages, matchers, strict=True)):
             decode, reader = matcher.decode, matcher.reader
-            if captures[place]:
+            if captures[place] or self._is_video(one.read):
                 stamped = with_captures(one.read, captures[place])
                 reader = StampedReader(build_reader(stamped, context))
                 decode = dating(captures[place], clocks, replies.note_of(name), decode)

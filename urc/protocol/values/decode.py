@@ -26,8 +26,8 @@ from urc.protocol.values.vectors import (
     array_converter,
     bytes_converter,
     object_converter,
-    video_converter,
 )
+from urc.protocol.values.video_message import VideoConverter
 
 __all__ = ["BadValue", "Convert", "build_converter", "build_raw"]
 
@@ -47,7 +47,7 @@ def build_converter(signal: Signal) -> Convert:
     if signal.type == "point_cloud":
         return cloud_converter(signal)
     if signal.type == "video":
-        return _usable(video_converter)
+        return VideoConverter()
     if signal.type in ("image", "blob"):
         return _usable(bytes_converter(signal))
     element = _element_converter(signal)

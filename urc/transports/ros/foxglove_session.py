@@ -49,7 +49,7 @@ from urc.transports.ros.graph import TopicGraph
 from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosapi_answers import RosapiAnswers
 from urc.transports.ros.topic_list import QUIET_S
-from urc.transports.ros.types import spelled
+from urc.transports.ros.types import is_video, spelled
 from urc.transports.topic_queue import TopicReceiveQueue
 
 __all__ = ["KNOWN_TOPICS", "FoxgloveSession"]
@@ -247,6 +247,8 @@ class FoxgloveSession:
             self._number += 1
             one = DrivenChannel(self._wishes[topic], channel, self._number)
             self._topics[topic] = self._subscriptions[one.number] = one
+            if is_video(channel.type):
+                self.queue.keep_groups(topic)
             self._define(channel)
             new.append({"id": one.number, "channelId": channel.id})
         if new:

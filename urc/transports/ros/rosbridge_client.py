@@ -27,7 +27,7 @@ from urc.transports.base import TransportError
 from urc.transports.ros.goals import FIRST_S, UnfinishedGoals, is_ros_id, longer
 from urc.transports.ros.robot_time import CLOCK_TOPIC, RobotTime
 from urc.transports.ros.rosbridge_operations import BadOperation, encode_operation
-from urc.transports.ros.types import spelled
+from urc.transports.ros.types import is_video, spelled
 from urc.transports.topic_queue import TopicReceiveQueue
 
 __all__ = ["RosSubscription", "RosClient"]
@@ -117,6 +117,8 @@ class RosClient:
             reconnect_on_close=False,
         )
         self.received[wanted.topic] = 0
+        if is_video(wanted.type):
+            self._queue.keep_groups(wanted.topic)
         topic.subscribe(lambda body: self._message(wanted.topic, body))
         self._listened[wanted.topic] = wanted, topic
         return self._protocol.written()

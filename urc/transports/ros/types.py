@@ -1,6 +1,10 @@
 """Type names in the forms of ROS 1 and ROS 2."""
 
-__all__ = ["spelled"]
+from typing import Final
+
+__all__ = ["is_video", "spelled"]
+
+_VIDEOS: Final = ("foxglove/CompressedVideo", "ffmpeg_image_transport_msgs/FFMPEGPacket")
 
 
 def spelled(name: str, kind: str, ros: int | None) -> str:
@@ -15,3 +19,9 @@ def spelled(name: str, kind: str, ros: int | None) -> str:
     if ros is None or not all(words) or len(words) not in (2, 3):
         return name
     return f"{words[0]}/{words[-1]}" if ros == 1 else f"{words[0]}/{kind}/{words[-1]}"
+
+
+def is_video(name: str) -> bool:
+    """Return whether messages of a type contain the encoded images of a video."""
+    words = name.replace("foxglove.", "foxglove/").split("/")
+    return f"{words[0]}/{words[-1]}" in _VIDEOS
