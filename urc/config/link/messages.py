@@ -67,6 +67,14 @@ def _check_video(
             key=True,
             hint="write raw: NAME, where the signal NAME has type: video",
         )
+    elif spec.type in VIDEO_LINES and not all(one.has_capture_time for one in signals):
+        problems.error(
+            part,
+            "misplaced-key",
+            f"'capture_time' has no effect for a video of a {spec.type}",
+            key=True,
+            hint="remove it from the signal: only messages have stamps that can be ignored",
+        )
     elif spec.type == "ros" and any(is_video):
         _check_video_message(part, read, driver, problems)
     elif spec.type not in VIDEO_LINES and any(is_video) and spec.type in (*MESSAGING, *BYTE_LINES):
