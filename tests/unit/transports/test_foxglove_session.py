@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from urc.model.payload import Envelope
+from urc.model.payload import LOST, Envelope
 from urc.transports.base import NOTICE, TOPICS
 from urc.transports.ros.foxglove_session import MAX_RETRIES, FoxgloveSession, TopicWish
 from urc.transports.ros.graph import TopicGraph
@@ -137,3 +137,34 @@ def test_an_earlier_definition_counts_only_until_the_robot_announces_another_one
     assert published(session) == binary
     hear(session, {"op": "advertise", "channels": [{**OWN, "schema": "int8 y\nint8 x"}]})
     assert published(session) == text
+
+
+def test_a_video_is_told_of_each_subscription() -> None:
+    """A pause leaves out messages, without which the next ones cannot be decoded."""
+    session = FoxgloveSession(
+        TopicReceiveQueue(),
+        (TopicWish("/film"), TopicWish("/odom")),
+        TopicGraph(lambda _: None, 2),
+        call_at=lambda _, __: None,
+        clock=lambda: math.inf,
+        published={},
+    )
+    film = {**ODOM, "id": 4, "topic": "/film", "schemaName": "foxglove.CompressedVideo"}
+    hear(session, {"op": "advertise", "channels": [film, ODOM]})
+
+    async def lost(number: int) -> bool:
+        session.arrived(MESSAGE[:1] + number.to_bytes(4, "little") + MESSAGE[5:])
+        while (told := await session.queue.pop()).verb != "message":
+            pass  # the definitions
+        return LOST in told.attributes
+
+    async def play() -> list[bool]:
+        assert set(subscribed(session)) == {3, 4}
+        found = [await lost(number) for number in (1, 1, 2, 2)]
+        session.perform(Envelope("unsubscribe", {"topic": "/film"}))
+        assert subscribed(session) == []
+        session.perform(Envelope("subscribe", {"topic": "/film"}))
+        assert subscribed(session) == [4]
+        return [*found, *[await lost(number) for number in (3, 3, 2)]]
+
+    assert asyncio.run(play()) == [True, False, False, False, True, False, False]

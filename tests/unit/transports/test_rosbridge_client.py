@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from urc.model.payload import Envelope
+from urc.model.payload import LOST, Envelope
 from urc.transports.base import GoalRecord, PeerClosed
 from urc.transports.ros.goals import LATE, MAX_GOALS, UnfinishedGoals
 from urc.transports.ros.rosbridge_client import RosClient, RosSubscription
@@ -302,3 +302,28 @@ def test_with_simulated_time_goals_and_calls_carry_it_instead_of_now() -> None:
         for envelope in (goal, call):
             (said,) = sent(client, envelope)
             assert said["args"] == {"poses": [{"header": {"stamp": stamp}}] * 2}
+
+
+def test_other_topics_than_videos_are_told_of_no_subscription() -> None:
+    client = RosClient(queue := TopicReceiveQueue(), 2, UnfinishedGoals())
+    client.listen(RosSubscription("/odom", "nav_msgs/Odometry"))
+    client.arrived({"op": "publish", "topic": "/odom", "msg": {}}, 100)
+    assert [LOST in one.attributes for one in told(queue)] == [False]
+
+
+def test_a_video_is_told_of_each_subscription() -> None:
+    """A pause leaves out messages, without which the next ones cannot be decoded."""
+    client = RosClient(queue := TopicReceiveQueue(), 2, UnfinishedGoals())
+    client.listen(RosSubscription("/film", "foxglove.CompressedVideo"))
+
+    async def heard() -> bool:
+        client.arrived({"op": "publish", "topic": "/film", "msg": {}}, 100)
+        return LOST in (await queue.pop()).attributes
+
+    async def play() -> list[bool]:
+        found = [await heard(), await heard()]
+        client.pause("/film")
+        client.resume("/film")
+        return [*found, await heard(), await heard()]
+
+    assert asyncio.run(play()) == [True, False, True, False]
