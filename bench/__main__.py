@@ -52,6 +52,7 @@ NAMES = (
     "motion_idle",
     "motion_input",
     "motion_loss",
+    "driving_lock",
 )
 
 PROGRAMS = {
@@ -67,6 +68,7 @@ PROGRAMS = {
     "operator_tasks": ("chromium",),
     "playground": ("chromium", "node", "pyodide", "axe"),
     "motion_input": ("chromium",),
+    "driving_lock": ("chromium", "ffmpeg"),
 }
 """Programs that each benchmark needs besides Python, as named in `scripts.needs`."""
 

@@ -16,7 +16,7 @@ from playwright.async_api import Page, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
-from tests.e2e.motion.carts import served
+from tests.e2e.motion.carts import Cart, served
 from tests.e2e.motion.driving import (
     PUSH_S,
     STOP,
@@ -73,12 +73,20 @@ class Seeing(Wire):
         self.seen_s = 0.0
         """Time of the newest image that is no repetition."""
 
+    def wait_s(self) -> float:
+        """Return the time until the next image, in seconds."""
+        return 0.05
+
+    def is_lost(self) -> bool:
+        """Return whether the network loses the next image."""
+        return False
+
     async def film(self) -> None:
-        """Publish an image every 50 ms, for as long as the camera films."""
+        """Publish images for as long as the camera films."""
         images = [colour_bars(64, 48), colour_bars(64, 64)]
         while True:
-            await asyncio.sleep(0.05)
-            if self.is_filming:
+            await asyncio.sleep(self.wait_s())
+            if self.is_filming and not self.is_lost():
                 now_s = self.clock.now()
                 if not self.is_repeating:
                     images.reverse()
@@ -98,9 +106,10 @@ async def filmed(
     *,
     has_camera: bool = True,
     frozen_after_s: float = 0.0,
+    seeing: Seeing | None = None,
 ) -> AsyncIterator[tuple[Seeing, Page]]:
     """Serve the robot and its film; give it, and its page when it can be driven."""
-    seeing = Seeing(has_camera=has_camera, frozen_after_s=frozen_after_s)
+    seeing = seeing or Seeing(has_camera=has_camera, frozen_after_s=frozen_after_s)
     async with driven(data, seeing) as (robot, address):
         assert isinstance(robot, Seeing)
         film = asyncio.create_task(robot.film())
@@ -252,6 +261,8 @@ async def test_a_page_without_the_camera_drives_only_by_an_override(
         await expect(page.locator("body")).to_contain_text("may drive without an image for 10 s")
 
 
+VIDEO_STOP_S: Final = 0.8
+"""`stop_after` of the cart with a video."""
 PROFILE: Final = """\
   eye: { type: camera, url: "udp://127.0.0.1:EYE" }
 signals:
@@ -274,37 +285,47 @@ interfaces:
 """
 
 
-@pytest.mark.needs("ffmpeg")
-async def test_a_video_that_freezes_stops_a_cart_behind_its_guard(
-    new_page: PageMaker, tmp_path: Path
-) -> None:
-    """H.264 over UDP, and the real ways of both: the camera's process, and the guard."""
+@asynccontextmanager
+async def filmed_cart(
+    new_page: PageMaker, folder: Path
+) -> AsyncIterator[tuple[Cart, Page, asyncio.subprocess.Process]]:
+    """Serve a cart behind its guard, with a video over UDP; give it, its page and ffmpeg."""
     port = free_port()
     async with (
         program(*test_card(port, *H264)) as ffmpeg,
-        served(tmp_path, PROFILE.replace("EYE", str(port))) as (cart, address),
+        served(folder, PROFILE.replace("EYE", str(port))) as (cart, address),
     ):
         page = await fresh(new_page)
         await page.goto(address)
         await page.wait_for_function("() => document.querySelector('.camera canvas')?.width >= 320")
         await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+        yield cart, page, ffmpeg
 
-        def moves() -> bool:
-            return bool(cart.heard) and cart.heard[-1] not in ("V 0", "V 0.0")
 
-        await push_until(moves, page, ".joystick-pad")
+def moves(cart: Cart) -> bool:
+    """Return whether the cart's newest frame is motion."""
+    return bool(cart.heard) and cart.heard[-1] not in ("V 0", "V 0.0")
+
+
+@pytest.mark.needs("ffmpeg")
+async def test_a_video_that_freezes_stops_a_cart_behind_its_guard(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """H.264 over UDP, and the real ways of both: the camera's process, and the guard."""
+    async with filmed_cart(new_page, tmp_path) as (cart, page, ffmpeg):
+        await push_until(lambda: moves(cart), page, ".joystick-pad")
         await asyncio.sleep(PUSH_S)
-        assert moves(), "a film that goes on stops nothing"
+        assert moves(cart), "a film that goes on stops nothing"
         os.kill(ffmpeg.pid, signal.SIGSTOP)
         began_s = asyncio.get_running_loop().time()
-        await until(lambda: not moves())
-        assert asyncio.get_running_loop().time() - began_s < 0.8 + MARGIN_S
+        await until(lambda: not moves(cart))
+        assert asyncio.get_running_loop().time() - began_s < VIDEO_STOP_S + MARGIN_S
         await expect(page.locator(".joystick-note")).to_contain_text("Image too old")
         os.kill(ffmpeg.pid, signal.SIGCONT)
         count = len(cart.heard)
         await asyncio.sleep(1.0)
         assert cart.heard[count:] == [], "the hand that held on moves nothing"
         await page.mouse.up()
-        await push_until(moves, page, ".joystick-pad")
+        await push_until(lambda: moves(cart), page, ".joystick-pad")
         await page.mouse.up()
         await until(lambda: cart.heard[-1] == "V 0")
