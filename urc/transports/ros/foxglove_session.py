@@ -581,8 +581,6 @@ class FoxgloveSession:
         nodes = self._graph_topics.publishers_of(topic)
         return bool(nodes) or "connectionGraph" not in self.capabilities
 
-    # -- the parts that parameters need; see `RosapiCalls`
-
     def topics(self) -> dict[str, str]:
         """Return the types of all topics, keyed by topic."""
         return {one.topic: one.type for one in self._channels.values()}
