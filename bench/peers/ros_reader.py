@@ -148,6 +148,7 @@ async def over_zenoh(port: int, topics: list[str]) -> None:
         "mode": "client",
         "connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"shared_memory": {"enabled": False}},  # a robot is another computer
     }
     newest = Newest(topics)
     session = zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
