@@ -44,7 +44,7 @@ READY_S = 40.0
 CAMERA_HZ = 15
 BYTES_WITH_CAMERAS, BYTES_WITHOUT, BYTES_OF_CBOR = 0.78, 0.5, 1.2
 """Goals for bytes, as ratios to rosbridge with JSON, and to rosbridge with CBOR."""
-CPU = {FOXGLOVE: 1.1, ZENOH: 1.2}
+CPU = {FOXGLOVE: 1.1, ZENOH: 1.3}
 """Goals for processor time, as ratios to rosbridge with JSON. Decoding is a small part: the engine
 and the page's feed, which all lines share, need most of the time. Zenoh has threads of its own."""
 

@@ -6,6 +6,8 @@ by missing replies to pings. When a connection ends, its unsent data is discarde
 """
 
 import asyncio
+import socket
+import sys
 from contextlib import suppress
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -33,6 +35,14 @@ READ_AHEAD_MESSAGES = 4
 MAX_MESSAGE_BYTES = 1_048_576
 UNTAKEN_BYTES = 1_048_576
 """Maximum number of unsent bytes in ping replies."""
+GATHER_S = 1 / 60
+"""Time for which small messages are gathered, in seconds: one display frame."""
+GATHER_BYTES = 8192
+"""Size of received data that belongs to small messages."""
+_WAKING_BYTES = 16384
+"""Number of received bytes that end the gathering early, such as an image."""
+_CAN_GATHER = sys.platform == "linux"
+"""Whether the system reports waiting data when the low-water mark of a socket is lowered."""
 _NORMAL = CloseCode.NORMAL_CLOSURE
 _CLOSE_S = 0.2
 """Timeout for an orderly close, in seconds; afterwards, the connection is reset."""
@@ -87,6 +97,16 @@ class WebSocketTransport:
         finally:
             if self._socket is None:
                 await self._dialer.close()
+
+    def gather(self) -> None:
+        """Gather small messages from now on, until this connection ends.
+
+        Each wake-up of the event loop costs more than a small message. Messages that arrive within
+        `GATHER_S` of an earlier one are therefore received together. The first message after a
+        pause, sent messages and the end of the connection do not wait.
+        """
+        if isinstance(self._socket, _LimitedConnection):
+            self._socket.is_gathering = _CAN_GATHER
 
     async def receive(self) -> bytes:
         """Return the next non-empty message; raise `PeerClosed` when the connection has ended."""
@@ -208,6 +228,8 @@ class _LimitedConnection(ClientConnection):
 
     _untaken = 0
     _sign: asyncio.Future[None] | None = None
+    is_gathering = False
+    """Whether the kernel gathers small messages; see `WebSocketTransport.gather`."""
 
     def next_sign(self) -> asyncio.Future[None]:
         """Return a future that completes when more data arrives or the connection ends."""
@@ -229,11 +251,20 @@ class _LimitedConnection(ClientConnection):
         self._give_sign()
         before = self.transport.get_write_buffer_size()
         super().data_received(data)
+        if self.is_gathering and len(data) < GATHER_BYTES:
+            self._wake_at(_WAKING_BYTES)
+            self.loop.call_later(GATHER_S, self._wake_at, 1)
         after = self.transport.get_write_buffer_size()
         self._untaken = self._untaken + after - before if before else after
         if self._untaken > UNTAKEN_BYTES:
             self.set_connection_exc(OSError("the robot does not read the replies to its pings"))
             self.transport.abort()
+
+    def _wake_at(self, size_bytes: int) -> None:
+        """Set the number of waiting bytes at which the kernel wakes the event loop."""
+        line = self.transport.get_extra_info("socket")
+        with suppress(OSError, ValueError):  # the connection has ended; uvloop raises ValueError
+            line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVLOWAT, size_bytes)
 
 
 class _Connect(connect):

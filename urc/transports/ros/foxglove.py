@@ -134,6 +134,7 @@ class FoxgloveTransport:
         except BaseException:
             await self.close()
             raise
+        self._wire.gather()
         if self._wishes:
             self._check = loop.call_later(_CHECK_S, session.check_topics)
 
