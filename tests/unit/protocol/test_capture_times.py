@@ -14,6 +14,8 @@ from urc.protocol.forms.topics import paths_by_topic
 from urc.protocol.readings.capture_times import stamp_s
 from urc.runtime.registries import built_in_catalog
 
+DAY_S = 1_700_000_000
+"""A time of day; the clocks of robots count from 1970."""
 JPEG = b"\xff\xd8image\xff\xd9"
 PROFILE = """
 urc: 1
@@ -60,22 +62,22 @@ class Rover:
 
 
 def ros(stamp_s: float) -> dict[str, Any]:
-    stamp = {"sec": int(stamp_s), "nanosec": round(stamp_s % 1 * 1e9)}
+    stamp = {"sec": DAY_S + int(stamp_s), "nanosec": round(stamp_s % 1 * 1e9)}
     return {"header": {"stamp": stamp, "frame_id": "eye"}, "format": "jpeg", "data": JPEG}
 
 
 def ros1(stamp_s: float) -> dict[str, Any]:
-    stamp = {"secs": int(stamp_s), "nsecs": round(stamp_s % 1 * 1e9)}
+    stamp = {"secs": DAY_S + int(stamp_s), "nsecs": round(stamp_s % 1 * 1e9)}
     return {"header": {"stamp": stamp}, "format": "jpeg", "data": JPEG}
 
 
 def foxglove(stamp_s: float) -> dict[str, Any]:
-    stamp = {"sec": int(stamp_s), "nanosec": round(stamp_s % 1 * 1e9)}
+    stamp = {"sec": DAY_S + int(stamp_s), "nanosec": round(stamp_s % 1 * 1e9)}
     return {"timestamp": stamp, "format": "jpeg", "data": JPEG}
 
 
 def foxglove_json(stamp_s: float) -> dict[str, Any]:
-    stamp = {"sec": int(stamp_s), "nsec": round(stamp_s % 1 * 1e9)}
+    stamp = {"sec": DAY_S + int(stamp_s), "nsec": round(stamp_s % 1 * 1e9)}
     return {"timestamp": stamp, "format": "jpeg", "data": JPEG}
 
 
@@ -105,8 +107,9 @@ def test_a_clock_that_is_set_is_one_line_in_the_log_and_locks_nothing(tmp_path: 
     "stamp",
     [
         *(None, 7.5, "now", [], {}, {"sec": 0, "nanosec": 0}, {"sec": -1, "nanosec": 0}),
-        *({"sec": 1}, {"sec": 1, "nanosec": 10**9}, {"sec": 2**40, "nanosec": 0}),
-        *({"sec": True, "nanosec": 0}, {"sec": 1.0, "nanosec": 0}, {"sec": 10**400, "nanosec": 0}),
+        *({"sec": DAY_S}, {"sec": DAY_S, "nanosec": 10**9}, {"sec": 2**40, "nanosec": 0}),
+        *({"sec": True, "nanosec": 0}, {"sec": DAY_S + 0.5, "nanosec": 0}),
+        *({"sec": 10**400, "nanosec": 0}, {"sec": 10**9 - 1, "nanosec": 0}),
     ],
 )
 def test_a_message_without_a_usable_stamp_counts_from_its_arrival(
@@ -129,7 +132,7 @@ def test_slow_clocks_can_be_left_out(tmp_path: Path, key: str, more: str) -> Non
 
 def test_a_stamp_alone_is_no_image(tmp_path: Path) -> None:
     rover = Rover(tmp_path)
-    assert rover.hear("/front", {"header": {"stamp": {"sec": 5, "nanosec": 0}}}, 1.0) == []
+    assert rover.hear("/front", {"header": {"stamp": {"sec": DAY_S, "nanosec": 0}}}, 1.0) == []
 
 
 def test_other_values_of_the_message_keep_their_arrival(tmp_path: Path) -> None:
@@ -143,3 +146,12 @@ def test_other_values_of_the_message_keep_their_arrival(tmp_path: Path) -> None:
 def test_binary_messages_are_read_up_to_their_stamp(tmp_path: Path) -> None:
     paths = paths_by_topic(Rover(tmp_path).driver, "ros", {})
     assert {("data",), ("header", "stamp"), ("timestamp",)} <= set(paths["/front"])
+
+
+def test_a_simulation_that_runs_slower_than_real_time_makes_nothing_old(tmp_path: Path) -> None:
+    """Its clock counts from its start."""
+    rover = Rover(tmp_path)
+    for step in range(100):
+        stamp = {"sec": step // 2, "nanosec": 5 * 10**8 * (step % 2)}
+        body = {"header": {"stamp": stamp}, "data": JPEG}
+        assert rover.age_s("/front", body, 10.0 + step) == 0

@@ -129,8 +129,8 @@ def test_a_loss_of_one_topic_costs_no_other_video(tmp_path: Path) -> None:
 def test_an_access_unit_that_waited_is_older_than_its_arrival(tmp_path: Path) -> None:
     """In its value too, from which other images are made."""
     rover = Rover(tmp_path)
-    assert rover.hear(foxglove(KEY, 1000), 10.0).time_s == 10.0
-    assert rover.hear(foxglove(KEY, 1001), 12.0).time_s == 11.0
+    assert rover.hear(foxglove(KEY, 1_700_000_000), 10.0).time_s == 10.0
+    assert rover.hear(foxglove(KEY, 1_700_000_001), 12.0).time_s == 11.0
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,9 @@ _PLACES: Final[tuple[JsonPath, ...]] = (("header", "stamp"), ("timestamp",))
 _DATA: Final = "data"
 _HIDDEN: Final = "_ captured"
 """Start of the names of hidden fields; the blank sets them apart from all names in documents."""
+_BEGIN_S: Final = 10**9
+"""Earliest time of day, in September 2001. Earlier stamps count from the start of a robot, or of a
+simulation, which may be slower than real time."""
 _END_S: Final = 2**40
 
 
@@ -124,7 +127,7 @@ def dating(
 
 
 def stamp_s(stamp: object) -> float | None:
-    """Return a time stamp in seconds; None for a stamp of zero, and for anything else.
+    """Return a time of day in seconds; None for any other stamp, and for anything else.
 
     ROS 1 has other names for the parts, and servers of Foxglove have a third form in JSON.
     """
@@ -134,6 +137,6 @@ def stamp_s(stamp: object) -> float | None:
     part = stamp.get("nanosec", stamp.get("nsecs", stamp.get("nsec")))
     if type(whole) is not int or type(part) is not int:
         return None
-    if not (0 <= part < 10**9 and 0 <= whole < _END_S) or not (whole or part):
+    if not (0 <= part < 10**9 and _BEGIN_S <= whole < _END_S):
         return None
     return whole + part / 1e9
