@@ -236,10 +236,9 @@ class FoxgloveSession:
         gone = [one for one in self._topics.values() if found.get(one.wish.topic) != one.channel]
         for one in gone:
             del self._topics[one.wish.topic], self._subscriptions[one.number]
-        if gone:
-            numbers = [one.number for one in gone if one.channel.id in self._channels]
-            if numbers:
-                self._op("unsubscribe", subscriptionIds=numbers)
+        numbers = [one.number for one in gone if one.channel.id in self._channels]
+        if numbers:
+            self._op("unsubscribe", subscriptionIds=numbers)
         new = []
         for topic, channel in found.items():
             if topic in self._topics:
