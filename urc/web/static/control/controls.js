@@ -162,7 +162,7 @@ export class Controls {
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });
     if (lease.latched) return ""; // the bar says it
-    return lease.drives ? t("Free to drive") : t("No one is driving; this page only watches");
+    return lease.drives ? t("Touch to drive") : t("No one is driving; this page only watches");
   }
 
   /** Return the text in the bar for a latched STOP. */
