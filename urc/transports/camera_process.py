@@ -200,9 +200,10 @@ def capture_s(packet: Any) -> float | None:
     """Return when an image was captured by the camera's clock, in seconds; None if unknown.
 
     The library keeps the time as a *producer reference time*: microseconds since 1970 in 64 bits,
-    then flags.
+    then flags. PyAV passes it on since version 16.
     """
-    if not packet.has_sidedata("prft"):
+    has_side_data = getattr(packet, "has_sidedata", None)
+    if has_side_data is None or not has_side_data("prft"):
         return None
     data = bytes(packet.get_sidedata("prft"))
     if len(data) < _REFERENCE.size:
