@@ -58,6 +58,14 @@ export class SettingChanges {
       this.kept.set(field, "");
     }
     this.forgotten.clear();
+    for (const box of this.form.querySelectorAll("[data-needed]")) {
+      if (hasValue(box)) box.removeAttribute("data-needed");
+    }
+  }
+
+  /** Return whether the saved settings are enough to connect. */
+  isComplete() {
+    return this.form.querySelector("[data-needed]") === null;
   }
 
   /** Mark a secret to be deleted. @param {string} name */

@@ -80,7 +80,9 @@ function offer() {
   tester.disabled = isBusy;
   tester.textContent = hasChange ? t("Test & save") : t("Test connection");
   tester.classList.toggle("urc-button-main", hasChange);
-  form.querySelector("[data-open]")?.classList.toggle("urc-button-main", !hasChange);
+  const open = form.querySelector("[data-open]");
+  open?.classList.toggle("urc-button-main", !hasChange);
+  if (open instanceof HTMLElement) open.hidden = !changes.isComplete();
 }
 
 /** @param {boolean} isLocked */
@@ -140,6 +142,7 @@ function offerAnyway() {
 /** @param {Map<import("./setting_changes.js").Field, string>} sent a field may have changed since */
 function saved(sent) {
   changes.keep(sent);
+  if (changes.unsaved().length > 0) count(); // changed while it was being saved
   // The interface chosen here becomes the device's choice.
   const path = root.dataset["robot"] ?? "/";
   const name = encodeURIComponent(chosen("interface"));
