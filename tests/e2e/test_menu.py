@@ -54,7 +54,7 @@ async def test_eight_robots_fit_on_the_screen_of_a_phone(new_page: PageMaker) ->
         page = await new_page(size="phone")
         await page.goto(address)
         assert await page.evaluate(WHOLE_ROWS) >= 8
-        await expect(page.locator(".urc-robot-kind").first).to_be_hidden()
+        await expect(page.locator(".urc-robot-kind").first).to_be_visible()
         row = await page.locator(card(page, 0)).bounding_box()
         assert row is not None
         assert row["height"] == pytest.approx(88, abs=1)
