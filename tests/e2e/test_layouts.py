@@ -324,11 +324,11 @@ async def test_a_touch_user_sees_hints_once_that_cover_no_control(new_page: Page
         await page.reload()
         await page.get_by_role("button", name="Got it").click()
         await page.reload()
-        await expect(page.locator("[data-who]")).to_contain_text("Touch to drive")
+        await expect(page.locator("[data-who]")).to_contain_text("Free")
         await expect(hints).to_have_count(0)
         mouse = await new_page(size="desktop", is_first=True)
         await mouse.goto(address)
-        await expect(mouse.locator("[data-who]")).to_contain_text("Touch to drive")
+        await expect(mouse.locator("[data-who]")).to_contain_text("Free")
         await expect(mouse.get_by_role("region", name="Hints")).to_have_count(0)
 
 

@@ -40,6 +40,7 @@ export class AlarmStrip {
       { class: "urc-button", type: "button", "data-alarm-seen": true, onclick: see, "aria-label": t("Acknowledge") },
       made("span", { class: "urc-alarm-seen-sign", "aria-hidden": "true" }, "✓"),
       made("span", { class: "urc-alarm-seen-word" }, t("Acknowledge")),
+      made("span", { class: "urc-alarm-seen-short", "aria-hidden": "true" }, `✓ ${t("Seen")}`),
     );
     /** The page's button for the shown alarm's command. @type {HTMLElement | null} */
     this.helper = null;

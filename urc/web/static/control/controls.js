@@ -17,6 +17,8 @@ const VERBS = ["reset", "take", "ask", "force", "yes", "no", "override", "leave"
 /** Duration of the ring around Reset after a press on a stopped control. */
 const POINTED_MS = 1500;
 /** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
+/** A stick, which takes control when it is touched. */
+const STICK = '.urc-cell[data-footprint="stick"]';
 const BEFORE_DRIVING = new Set(["reset", "take", "ask", "force"]);
 
 export class Controls {
@@ -128,6 +130,8 @@ export class Controls {
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
     const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS, (drive.overrideMs - nowMs) / 1000);
     if (this.who.textContent !== text) this.who.textContent = text;
+    const hint = text === t("Free") && document.querySelector(STICK) ? `: ${t("touch the stick")}` : "";
+    if ((this.who.dataset["hint"] ?? "") !== hint) this.who.dataset["hint"] = hint;
     const stopped = isLatched ? this.stoppedWords() : "";
     if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
     if (this.latchedText.textContent !== stopped) this.latchedText.textContent = stopped;
@@ -162,7 +166,7 @@ export class Controls {
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });
     if (lease.latched) return ""; // the bar says it
-    return lease.drives ? t("Touch to drive") : t("No one is driving; this page only watches");
+    return lease.drives ? t("Free") : t("No one is driving; this page only watches");
   }
 
   /** Return the text in the bar for a latched STOP. */
