@@ -19,7 +19,8 @@ PACKAGES = list(hatch_sbom.python_packages(ROOT))
 MODULES = list(hatch_sbom.npm_packages(ROOT, sorted(hatch_build.VENDORED)))
 KNOWN = {
     "0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "EPL-2.0",
-    "GPL-2.0-or-later", "ISC", "MIT", "MIT-0", "MIT-CMU", "OFL-1.1", "PSF-2.0", "TCL", "ZPL-2.1", "Zlib",
+    "GPL-2.0-or-later", "ISC", "MIT", "MIT-0", "MIT-CMU", "OFL-1.1", "PSF-2.0",
+    "TCL", "ZPL-2.1", "Zlib",
 }  # fmt: skip
 """All licences among the packages. A new one needs a look at its terms before it is added here."""
 COPYLEFT = {"GPL-2.0-or-later"}
