@@ -253,7 +253,7 @@ def _zip(folder: Path, archive: Path, pattern: str = "*") -> None:
 
 def _write_dashboard(folder: Path) -> None:
     """Copy the files that pages load, to the paths at which a server serves them."""
-    web = ("js", "mjs", "css", "svg", "png", "jpg", "webp", "json", "stl", "dae", "urdf")
+    web = ("js", "mjs", "css", "svg", "png", "jpg", "webp", "json", "stl", "dae", "urdf", "woff2")
     _copy_tree_of(ROOT / "urc" / "web" / "static", folder / "static", web)
     _copy_tree_of(ROOT / "widgets", folder / "widgets", web)
     for file in sorted((ROOT / "robots").glob("*.yaml")):
