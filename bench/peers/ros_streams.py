@@ -48,9 +48,9 @@ Send = Callable[[str, int], Awaitable[None]]
 """Sends a topic's message with the given number."""
 
 
-def header() -> Any:
+def header(sec: int = 1_700_000_000) -> Any:
     """Return a header with a constant time."""
-    stamp = TYPES["builtin_interfaces/msg/Time"](sec=1_700_000_000, nanosec=123_456_789)
+    stamp = TYPES["builtin_interfaces/msg/Time"](sec=sec, nanosec=123_456_789)
     return TYPES["std_msgs/msg/Header"](stamp=stamp, frame_id="odom")
 
 
@@ -121,7 +121,8 @@ def picture(turn: float) -> Any:
     file = io.BytesIO()
     image.save(file, "JPEG", quality=QUALITY)
     data = numpy.frombuffer(file.getvalue(), numpy.uint8)
-    return TYPES["sensor_msgs/msg/CompressedImage"](header=header(), format="jpeg", data=data)
+    # With a constant time of this century, the images would count as repetitions of an old one.
+    return TYPES["sensor_msgs/msg/CompressedImage"](header=header(sec=1), format="jpeg", data=data)
 
 
 MAKES = {"odom": odometry, "imu": imu, "scan": scan, "front": picture, "rear": picture}

@@ -85,7 +85,7 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
             hysteresis=2,
             attributes=(
                 ("lolo", AlarmAttributes("high", discharged, "Charge the Puppet now.")),
-                ("low", AlarmAttributes("low", discharged, "Finish the task.")),
+                ("low", AlarmAttributes("low", discharged, "Charge the Puppet soon.")),
             ),
         ),
         stale_after_s=3.0,
