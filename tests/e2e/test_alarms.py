@@ -189,6 +189,44 @@ async def test_the_strip_presses_the_button_of_the_page_that_carries_out_the_act
         await help_button.wait_for(state="hidden")
 
 
+async def test_the_strip_offers_no_button_that_must_be_held_and_takes_a_held_key_once(
+    new_page: PageMaker,
+) -> None:
+    """A tap on the strip cannot hold a button; a held Enter repeats its clicks."""
+    low = AlarmLimits(low=20, attributes=(("low", LOW._replace(command="beep")),))
+    dock = AlarmLimits(low=20, attributes=(("low", LOW._replace(command="dock")),))
+    profile = dashboard_profile(
+        uses=[
+            *USES,
+            WidgetUse("horn", "button", {}, {"press": "beep"}, title="Beep"),
+            WidgetUse("home", "button", {}, {"press": "dock"}, {"gesture": "hold"}, title="Dock"),
+        ],
+        signals={
+            "battery": BATTERY._replace(limits=low),
+            "cell": BATTERY._replace(name="cell", title="Cell", limits=dock),
+        },
+        commands=commands(CALM_LEASE_S)
+        | {name: Command(name, "wire", WriteSpec("text", {})) for name in ("beep", "dock")},
+    )
+    robot = FakeRobot(profile)
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("cell", 15, alarm="low")
+        await until_text(page, "[data-alarm-strip] .urc-alarm-line", "Cell: Low, 15 %")
+        assert await page.locator("[data-alarm-help]").is_hidden()
+        robot.set_reading("cell", 90)
+        robot.set_reading("battery", 15, alarm="low")
+        await until_text(page, "[data-alarm-help]", "Beep")
+        await page.locator("[data-alarm-help]").focus()
+        for _ in range(5):
+            await page.keyboard.down("Enter")
+            await page.wait_for_timeout(60)
+        await page.keyboard.up("Enter")
+        assert robot.commands == [("beep", {})]
+
+
 async def test_a_watching_page_shows_alarms_and_offers_no_action(new_page: PageMaker) -> None:
     robot = robot_of(BATTERY)
     async with running_dashboard(robot) as address:

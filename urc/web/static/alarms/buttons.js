@@ -2,6 +2,7 @@
 /**
  * The page's buttons for commands, found by the configuration of their cells. An alarm presses such
  * a button instead of sending the command itself, so rights, questions and refusals stay in one place.
+ * Buttons that a single tap presses have the attribute `data-presses`, with their name.
  */
 
 /** Commands of each cell. @type {WeakMap<HTMLElement, Set<string>>} */

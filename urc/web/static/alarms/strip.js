@@ -45,6 +45,9 @@ export class AlarmStrip {
     /** The page's button for the shown alarm's command. @type {HTMLElement | null} */
     this.helper = null;
     this.help = made("button", { class: "urc-button", type: "button", "data-alarm-help": true, onclick: () => this.helper?.click() });
+    this.help.addEventListener("keydown", (event) => {
+      if (event.repeat) event.preventDefault(); // a held key repeats its clicks; all these clicks count as one
+    });
     const text = made("span", { class: "urc-alarm-text" }, this.line, this.action);
     this.open = made(
       "button",
