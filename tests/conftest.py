@@ -144,10 +144,10 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
-    """Fail a test that leaves a database open; servers of the e2e tests end with their module."""
+    """Fail a test that leaves a database open; what other threads opened ends with its module."""
     result = yield
     left = open_databases.left_open(is_last=nextitem is None or nextitem.path != item.path)
-    if left and "e2e" not in item.path.parts:
+    if left:
         pytest.fail("left open: " + "; ".join(left), pytrace=False)
     return result
 

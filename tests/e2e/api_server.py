@@ -5,7 +5,7 @@ import json
 import secrets
 import time
 from collections.abc import AsyncIterator, Callable, Mapping
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, closing
 from pathlib import Path
 from typing import Any
 
@@ -94,12 +94,12 @@ _KNOWN_S = 5.0
 
 
 class ApiServer:
-    """A running server, and the store of its people."""
+    """A running server, and the folder with the store of its people."""
 
-    def __init__(self, process: UrcProcess, address: str, store: AccessStore) -> None:
+    def __init__(self, process: UrcProcess, address: str, data: Path) -> None:
         self.process = process
         self.address = address
-        self.store = store
+        self._data = data
 
     def token(
         self, *grants: str, commands: tuple[str, ...] = (), is_known: bool = True
@@ -111,8 +111,9 @@ class ApiServer:
         now = time.time()
         allowed = [parse_grant(one) for one in grants]
         name = secrets.token_hex(4)
-        added = self.store.add("program", name, allowed, now=now, commands=commands)
-        _, secret = self.store.open_sign_in(added.id, "token", now=now)
+        with closing(AccessStore(self._data)) as store:
+            added = store.add("program", name, allowed, now=now, commands=commands)
+            _, secret = store.open_sign_in(added.id, "token", now=now)
         until = time.monotonic() + _KNOWN_S
         while (
             is_known and self._status(secret) == 401
@@ -120,9 +121,14 @@ class ApiServer:
             assert time.monotonic() < until, "the server does not know the token"
         return added.id, secret
 
+    def begin_to_remove(self, program: str) -> None:
+        """Remove a program; the server notices it a little later."""
+        with closing(AccessStore(self._data)) as store:
+            store.remove(program)
+
     def remove(self, program: str, token: str) -> None:
         """Remove a program; wait until the server refuses its token."""
-        self.store.remove(program)
+        self.begin_to_remove(program)
         until = time.monotonic() + _KNOWN_S
         while self._status(token) != 401:
             assert time.monotonic() < until, "the server still accepts the token"
@@ -154,7 +160,7 @@ def started(
     data = folder / "data"
     process = start("serve", *files, "--simulate", "--port", "0", "--data-dir", str(data), *more)
     address = process.wait_for(r"dashboard (http://\S+?/)$")[1]
-    return ApiServer(process, address, AccessStore(data))
+    return ApiServer(process, address, data)
 
 
 class Events:

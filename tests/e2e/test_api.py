@@ -187,7 +187,7 @@ async def test_a_stream_sends_changes_until_the_right_ends(server: ApiServer) ->
         assert list(await events.until("connections")) == ["wire"]
         values = await events.until("values")
         assert list(values["values"]) == ["battery"]
-        server.store.remove(program)
+        server.begin_to_remove(program)
         began = time.monotonic()
         end = await events.until("end")
         assert time.monotonic() - began < UNHURRIED_S
@@ -317,7 +317,7 @@ async def test_a_revoked_token_stops_the_robot(server: ApiServer, api: httpx2.As
     async with server.client(token) as client:
         lease = await taken(client)
         number = await driven(client, lease, 0.3)
-        server.store.remove(program)
+        server.begin_to_remove(program)
         began = time.monotonic()
         while (await api.get("robots/cart/controls")).json()["holder"]:
             assert time.monotonic() - began < UNHURRIED_S

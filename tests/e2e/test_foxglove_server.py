@@ -278,7 +278,7 @@ def test_a_removed_token_closes_the_socket(server: ApiServer) -> None:
     program, token = server.token("watch")
     with client(server, token) as line:
         operations(line, "advertise")
-        server.store.remove(program)
+        server.begin_to_remove(program)
         assert disconnected(line) == CLOSE_NOT_LET_IN
 
 
