@@ -131,7 +131,9 @@ class WebKitWindow(Window):
 def webkit_window() -> Iterator[Window]:
     """Start a virtual screen and a WebKit in it; both end with the block."""
     driver = _DRIVER.find() or "WebKitWebDriver"
-    with tempfile.TemporaryDirectory() as folder, _screen() as display:
+    # The browser's processes may write to their caches a little longer than the driver runs.
+    home = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+    with home as folder, _screen() as display:
         options = WebKitGTKOptions()
         options.add_argument("--automation")
         options.page_load_strategy = "eager"
