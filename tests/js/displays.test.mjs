@@ -9,7 +9,7 @@ import { Mean, cellScale, clock, spread, timeLeft } from "../../widgets/battery/
 import { angleOf, bearing, bearingAt, bearingOf, figures, point, turn } from "../../widgets/compass/bearing.js";
 import { angle, arc, dashes } from "../../widgets/gauge/arc.js";
 import { pictureOf } from "../../widgets/image/source.js";
-import { Ring, csv, extent, seconds, table } from "../../widgets/plot/traces.js";
+import { Ring, csv, extent, seconds, spanFor, table } from "../../widgets/plot/traces.js";
 import { Minute, bars } from "../../widgets/signal/strength.js";
 import { lengthOf, shownIn } from "../../widgets/speed/pace.js";
 import { levelOf, rowsOf, rowsOfLists, shown } from "../../widgets/table/rows.js";
@@ -231,4 +231,13 @@ test("a profile's picture is a picture and nothing else", () => {
   for (const source of ["javascript:alert(1)", "https://x/y.png", "data:text/html,x", "", null]) {
     assert.equal(pictureOf({ source }), "");
   }
+});
+
+test("the time span of a plot doubles with its readings, up to the window", () => {
+  assert.equal(spanFor(0, 60), 10);
+  assert.equal(spanFor(10, 60), 10);
+  assert.equal(spanFor(10.5, 60), 20);
+  assert.equal(spanFor(59, 60), 60);
+  assert.equal(spanFor(9999, 300), 300);
+  assert.equal(spanFor(9999, 10), 10, "a window of 10 s never grows");
 });

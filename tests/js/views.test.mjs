@@ -12,7 +12,7 @@ import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideO
 import { Even, NO_RAY, Uneven, faultOf } from "../../widgets/scan/fan.js";
 import { arc, band, chart, dots, graph, view } from "../../widgets/scan/paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf as scanSide,
+  Rim, bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, rimOf, ringStep, sideOf as scanSide,
 } from "../../widgets/scan/rays.js";
 import { fileOf } from "../../widgets/scene3d/model.js";
 import { angles, cameraAt, cloud, fromAngles, fromOrientation, posture, turned as spun } from "../../widgets/scene3d/pose.js";
@@ -96,17 +96,30 @@ test("the nearest thing of a sweep is told with its side; what is clear or not k
   assert.deepEqual([10, 4, 0.9, 250].map((most) => ringStep(most)), [2, 1, 0.2, 50]);
 });
 
+test("the picture of a scan is as large as nine of ten obstacles need", () => {
+  const room = new Float32Array([...new Array(9).fill(2.2), 9]);
+  assert.equal(rimOf(room, 12), 2.5);
+  assert.equal(rimOf(room, 2), 2, "never beyond the sensor");
+  assert.equal(rimOf(new Float32Array([12, NaN]), 12), 12, "nothing in sight");
+  const rim = new Rim();
+  assert.deepEqual([[10, 0], [2, 1], [2, 2.9], [2, 3]].map(([far = 0, time = 0]) => rim.follow(far, time)), [10, 10, 10, 2]);
+  assert.equal(rim.follow(5, 3.1), 5, "it grows at once");
+  assert.deepEqual([[2, 4], [5, 5], [2, 6], [2, 7.9]].map(([far = 0, time = 0]) => rim.follow(far, time)), [5, 5, 5, 5]);
+});
+
 const INK = { wall: 1, near: 2, stop: 3, free: 4, unknown: 5 };
 
 test("each picture of a scan puts things where they are", () => {
   const fan = new Even(4, -Math.PI, Math.PI / 2); // behind, right, ahead, left
-  const limits = { most: 10, near: 6, stop: 3 };
+  const limits = { most: 10, reach: 10, near: 6, stop: 3 };
   const seen = measured([10, 5, 2, NaN], 0, 10, new Float32Array(4));
   const size = 101;
   const pixels = new Uint32Array(size * size);
   const look = (/** @type {number} */ x, /** @type {number} */ y) => pixels[y * size + x];
   dots(pixels, size, seen, directions(fan), limits, INK);
   assert.deepEqual([look(75, 50), look(50, 40), look(50, 100), look(10, 50)], [2, 3, 0, 0]);
+  dots(pixels, size, seen, directions(fan), { ...limits, most: 4 }, INK);
+  assert.deepEqual([look(100, 50), look(50, 25), look(50, 100)], [5, 3, 0], "what is beyond the rim is faint on it");
   const [rays, reach] = [rayOfPixels(fan, bearingOfPixels(size)), reachOfPixels(size)];
   chart(pixels, rays, reach, size, seen, limits, INK);
   assert.deepEqual([look(60, 50), look(75, 50), look(90, 50), look(50, 45), look(50, 40), look(30, 50)], [4, 2, 0, 4, 3, 5]);
@@ -170,7 +183,7 @@ test("angles that cannot be those of the distances are a fault; a beam without b
 
 test("uneven beams are drawn where they look", () => {
   const fan = new Uneven(degrees([0, 90, 120]));
-  const limits = { most: 10, near: 6, stop: 3 };
+  const limits = { most: 10, reach: 10, near: 6, stop: 3 };
   const seen = measured([2, 5, 8], 0, 10, new Float32Array(3));
   const size = 101;
   const pixels = new Uint32Array(size * size);
@@ -189,7 +202,7 @@ test("a sweep of 1080 rays is drawn without a new object for each", () => {
   const values = Array.from({ length: 1080 }, (_, index) => 2 + Math.sin(index / 40));
   const [seen, pixels] = [new Float32Array(1080), new Uint32Array(420 * 420)];
   measured(values, 0, 5, seen);
-  dots(pixels, 420, seen, directions(fan), { most: 5, near: 0, stop: 0 }, INK);
+  dots(pixels, 420, seen, directions(fan), { most: 5, reach: 5, near: 0, stop: 0 }, INK);
   assert.ok(pixels.filter((each) => each === INK.wall).length > 1080);
 });
 

@@ -3,6 +3,9 @@
  * The latest readings of several signals, and the range of their drawing. Pure.
  */
 
+/** Time span of a plot without readings, in seconds. */
+const FIRST_SPAN_S = 10;
+
 /** Readings of one signal: the newest `size`, oldest first. A gap is NaN. */
 export class Ring {
   /** @param {number} size */
@@ -156,4 +159,17 @@ function quoted(text) {
 export function seconds(text) {
   const match = /^(\d+)(s|min)$/.exec(String(text));
   return match ? Number(match[1]) * (match[2] === "min" ? 60 : 1) : 60;
+}
+
+/**
+ * Return the shown time span: as long as the readings need, doubled from 10 s up to the window.
+ *
+ * @param {number} ageS age of the oldest reading, in seconds; 0 without readings
+ * @param {number} windowS longest time span
+ * @returns {number} seconds
+ */
+export function spanFor(ageS, windowS) {
+  let span = FIRST_SPAN_S;
+  while (span < ageS) span *= 2;
+  return Math.min(span, windowS);
 }

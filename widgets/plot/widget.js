@@ -9,7 +9,7 @@ import { History } from "./history.js";
 import { Live } from "./live.js";
 import { epoch, legendItem, ruled, sharedWords, writeValue } from "./parts.js";
 import { SmallLegend } from "./small_legend.js";
-import { Ring, csv, extent, seconds, table } from "./traces.js";
+import { Ring, csv, extent, seconds, spanFor, table } from "./traces.js";
 
 const COLOURS = /** @type {const} */ (["series-1", "series-2", "series-3", "series-4", "series-5", "series-6"]);
 /** Dash patterns for lines without a colour of their own, and for all lines in a theme with one colour. */
@@ -36,7 +36,8 @@ class Plot {
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
     this.windowS = seconds(options["window"]);
-    this.live = new Live(part(el, ".plot-picture"), this.windowS);
+    this.live = new Live(part(el, ".plot-picture"), spanFor(0, this.windowS));
+    this.spanText = part(el, ".plot-span");
     /** @type {readonly Reading[]} */
     this.readings = [];
     /** @type {number[]} */
@@ -57,6 +58,7 @@ class Plot {
     this.pausing = 0;
     this.isSeen = true;
     this.timer = 0;
+    this.tellSpan();
     this.listen();
   }
 
@@ -225,6 +227,7 @@ class Plot {
   fit(isNeeded) {
     const nowMs = performance.now();
     this.fitMs = nowMs;
+    this.widen(nowMs / 1000);
     const shown = this.live.traces.filter((trace) => trace.isShown).map(({ ring }) => ring);
     const [least, most] = extent(shown, nowMs / 1000 - this.windowS);
     const [bottom, top] = spanOf(least, most, this.limits().map(([, limit]) => limit));
@@ -238,6 +241,22 @@ class Plot {
     this.live.scale = [start, end];
     this.live.spoil();
     this.rule();
+  }
+
+  /** Let the time span grow with the readings: a new plot is not mostly empty. @param {number} nowS */
+  widen(nowS) {
+    const rings = this.live.traces.map(({ ring }) => ring).filter(({ count }) => count > 0);
+    const oldestS = Math.min(nowS, ...rings.map((ring) => ring.time(ring.first)));
+    const span = spanFor(nowS - oldestS, this.windowS);
+    if (span === this.live.spanS) return;
+    this.live.spanS = span;
+    this.live.spoil();
+    this.tellSpan();
+  }
+
+  tellSpan() {
+    const { spanS } = this.live;
+    write(this.spanText, this.ctx.t("last {time}", { time: spanS % 60 === 0 && spanS > 60 ? `${spanS / 60} min` : `${spanS} s` }));
   }
 
   /** @returns {[string, number][]} */

@@ -12,6 +12,7 @@
  *
  * @typedef {object} Limits Distances in the unit of the scan.
  * @property {number} most distance at the rim
+ * @property {number} reach distance from which the way is clear
  * @property {number} near
  * @property {number} stop
  */
@@ -30,6 +31,7 @@ export function inkOf(distance, { near, stop }, ink) {
 
 /**
  * Draw a dot for each ray around the middle. Near dots are larger, so that colour is not the only cue.
+ * Obstacles beyond the rim are faint dots on it.
  *
  * @param {Uint32Array} into
  * @param {number} size
@@ -44,11 +46,13 @@ export function dots(into, size, distances, ways, limits, ink) {
   const scale = centre / limits.most;
   for (let index = 0; index < distances.length; index += 1) {
     const distance = distances[index] ?? NaN;
-    if (!(distance < limits.most)) continue;
-    const x = Math.round(centre + (ways.right[index] ?? 0) * distance * scale);
-    const y = Math.round(centre + (ways.down[index] ?? 0) * distance * scale);
+    if (!(distance < limits.reach)) continue;
+    const isBeyond = distance > limits.most;
+    const way = isBeyond ? centre : distance * scale;
+    const x = Math.round(centre + (ways.right[index] ?? 0) * way);
+    const y = Math.round(centre + (ways.down[index] ?? 0) * way);
     const half = distance <= limits.stop ? 3 : distance <= limits.near ? 2 : 1;
-    const pixel = inkOf(distance, limits, ink);
+    const pixel = isBeyond ? ink.unknown : inkOf(distance, limits, ink);
     const [left, right] = [Math.max(0, x - half), Math.min(size - 1, x + half)];
     const bottom = Math.min(size - 1, y + half);
     for (let row = Math.max(0, y - half); row <= bottom; row += 1) {

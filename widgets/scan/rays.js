@@ -9,6 +9,8 @@
  */
 
 const TURN = 2 * Math.PI;
+/** Time for which the obstacles must be nearer before the picture is enlarged. */
+const SHRINK_AFTER_S = 2;
 
 /**
  * Return the distances to draw: NaN if unknown, `most` if clear, and 0 if an obstacle is too close
@@ -104,6 +106,49 @@ export function nearest(distances, fan, most) {
     }
   }
   return found < 0 ? null : { distance: least, angle: fan.angleAt(found) };
+}
+
+/** Round distances for the rim, between two powers of ten. */
+const RIMS = [1, 1.25, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10];
+/** Fraction of the obstacles that lie within the rim. */
+const WITHIN = 0.9;
+/** Margin outside them. */
+const MARGIN = 1.05;
+
+/**
+ * Return a round distance for the rim that nine of ten obstacles lie within; `most` without obstacles.
+ *
+ * @param {Float32Array} distances
+ * @param {number} most
+ */
+export function rimOf(distances, most) {
+  const seen = distances.filter((each) => each < most).sort();
+  const far = (seen[Math.ceil(seen.length * WITHIN) - 1] ?? 0) * MARGIN;
+  if (!(far > 0)) return most;
+  const power = 10 ** Math.floor(Math.log10(far));
+  return Math.min(most, (RIMS.find((each) => each * power >= far) ?? 10) * power);
+}
+
+/** The distance at the rim of the picture: it grows at once, and shrinks after some seconds. */
+export class Rim {
+  constructor() {
+    this.value = 0;
+    this.sinceS = NaN;
+  }
+
+  /**
+   * @param {number} wanted
+   * @param {number} timeS
+   */
+  follow(wanted, timeS) {
+    const isSmaller = wanted < this.value;
+    if (isSmaller && Number.isNaN(this.sinceS)) this.sinceS = timeS;
+    if (!isSmaller) this.sinceS = NaN;
+    if (isSmaller && !(timeS - this.sinceS >= SHRINK_AFTER_S)) return this.value;
+    this.sinceS = NaN;
+    this.value = wanted;
+    return wanted;
+  }
 }
 
 /**

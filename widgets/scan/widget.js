@@ -12,7 +12,7 @@ import { Even, Uneven, faultOf } from "./fan.js";
 import { Overlay } from "./overlay.js";
 import { arc, band, chart, dots, graph, view } from "./paint.js";
 import {
-  bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, ringStep, sideOf,
+  Rim, bearingOfPixels, directions, measured, nearest, rayOfPixels, raysOfColumns, reachOfPixels, rimOf, ringStep, sideOf,
 } from "./rays.js";
 
 /** Largest image in pixels; a slow device cannot fill more per frame. */
@@ -78,6 +78,7 @@ class Scan {
     this.most = 10;
     /** Distance at the rim of the picture; 0 before the first sweep. */
     this.rim = 0;
+    this.fitted = new Rim();
     this.distances = new Float32Array(0);
     /** @type {Fan} */
     this.fan = new Even(0, 0, 0);
@@ -197,7 +198,7 @@ class Scan {
     const { width, height } = this.room;
     if (!reading || width === 0 || height === 0) return;
     const isFlat = this.view === "graph" || this.view === "depth";
-    if (reading.serial !== this.serial) this.measure(Array.isArray(reading.value) ? reading.value : []);
+    if (reading.serial !== this.serial) this.measure(Array.isArray(reading.value) ? reading.value : [], reading.time);
     this.overlay.draw({
       width,
       height,
@@ -255,17 +256,22 @@ class Scan {
     };
   }
 
-  /** @param {readonly unknown[]} values */
-  measure(values) {
+  /**
+   * @param {readonly unknown[]} values
+   * @param {number} timeS
+   */
+  measure(values, timeS) {
     measured(values, Number(this.options["range_min"] ?? 0), this.most, this.distances);
-    this.rim = this.most;
+    const isAround = this.view === "polar" || this.view === "map";
+    const isFitted = isAround && this.options["fit"] !== false;
+    this.rim = isFitted ? this.fitted.follow(rimOf(this.distances, this.most), timeS) : this.most;
   }
 
   paint() {
     const { pixels, ink, tables, image, distances: all } = this;
     if (!ink) return;
     const near = Number(this.options["near"] ?? 0);
-    const limits = { most: this.rim, near, stop: Number(this.options["stop"] ?? 0) };
+    const limits = { most: this.rim, reach: this.most, near, stop: Number(this.options["stop"] ?? 0) };
     const { width, height } = image;
     if (all.length === 0) pixels.fill(0);
     else if (this.view === "polar") dots(pixels, width, all, tables.ways, limits, ink);

@@ -93,7 +93,10 @@ async def test_rays_at_uneven_angles_are_drawn_where_they_look(new_page: PageMak
         "ways": Signal("ways", "array", unit="deg", stale_after_s=60),
     }
     use = WidgetUse(
-        "s", "scan", {"ranges": "sweep", "angles": "ways"}, options={"range_max": 10, "stop": 3.0}
+        "s",
+        "scan",
+        {"ranges": "sweep", "angles": "ways"},
+        options={"range_max": 10, "stop": 3.0, "fit": False},
     )
     page = await new_page(size="tablet")
     async with shown(page, signals, use) as robot:
