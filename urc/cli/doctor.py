@@ -42,6 +42,7 @@ EXTRAS = {
     "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
     "mcap": ("record", "recordings of sessions"),
     "av": ("video", "cameras that send H.264 or H.265"),
+    "aiortc": ("whep", "cameras behind a WebRTC server, with WHEP"),
     "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
 }
 """Extra and purpose of each optional package, by package name."""

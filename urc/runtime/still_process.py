@@ -16,7 +16,7 @@ from io import RawIOBase
 from typing import Any, Final
 
 from urc.images import MAX_PIXELS
-from urc.transports.camera_process import UnitQueue
+from urc.transports.camera_records import UnitQueue
 from urc.video import MAX_UNIT_BYTES, VideoUnit, read_unit
 
 __all__ = ["EVERY_S", "MADE", "TAKEN", "StillMakerFault", "main", "stills"]

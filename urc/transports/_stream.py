@@ -178,6 +178,16 @@ class TcpStream(asyncio.BufferedProtocol):
         """Whether both directions of the connection have ended."""
         return self._ended is not None
 
+    def ends(self) -> tuple[str, str]:
+        """Return the IP addresses of this computer's end and of the peer's end.
+
+        Raises:
+            OSError: the connection has ended.
+        """
+        if self._line is None:
+            raise OSError("the connection has no socket")
+        return self._line.getsockname()[0], self._line.getpeername()[0]
+
     def unsent(self) -> int:
         """Return the number of bytes that the other side has not acknowledged."""
         # Called before each motion: a writable connection's own buffer is empty.

@@ -20,6 +20,7 @@ from urc.transports.base import (
     PeerClosed,
     SupportsEnd,
     TransportError,
+    ends_of,
     reset,
     unsent_of,
 )
@@ -140,6 +141,9 @@ class _TlsStream:
 
     async def abort(self) -> None:
         await self._stream.abort()
+
+    def ends(self) -> tuple[str, str]:
+        return ends_of(self._stream)
 
     def unsent(self) -> int:
         return self._leaving.pending + unsent_of(self._stream)

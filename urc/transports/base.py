@@ -28,6 +28,7 @@ __all__ = [
     "SupportsAbort",
     "SupportsArrivals",
     "SupportsEnd",
+    "SupportsEnds",
     "SupportsForget",
     "SupportsGoals",
     "SupportsOffer",
@@ -39,6 +40,7 @@ __all__ = [
     "Transport",
     "TransportError",
     "bytes_of",
+    "ends_of",
     "reset",
     "unsent_of",
 ]
@@ -304,6 +306,32 @@ class SupportsEnd(Protocol):
 
     def end(self, why: str) -> None:
         """Make `read` and `write` raise `PeerClosed` with the reason `why` from now on."""
+
+
+@runtime_checkable
+class SupportsEnds(Protocol):
+    """A stream that knows the IP addresses of its two ends."""
+
+    def ends(self) -> tuple[str, str]:
+        """Return the IP addresses of this computer's end and of the peer's end.
+
+        Raises:
+            OSError: the connection has ended.
+        """
+
+
+def ends_of(stream: ByteStream | None) -> tuple[str, str]:
+    """Return the IP addresses of both ends of a stream.
+
+    Raises:
+        ConnectFailed: the addresses are unknown, or the connection has ended.
+    """
+    if stream is None or not isinstance(stream, SupportsEnds):
+        raise ConnectFailed("the addresses of the connection are unknown")
+    try:
+        return stream.ends()
+    except OSError as fault:
+        raise ConnectFailed("the robot closed the connection") from fault
 
 
 def unsent_of(stream: ByteStream | None) -> int:

@@ -1,7 +1,7 @@
 """The factory for the camera transport, for cameras that send H.264 or H.265.
 
-This module does not import the video library, which only the camera's own process uses, so that it
-can report a missing library.
+This module does not import the video libraries, which only the camera's own process uses, so that
+it can report a missing library.
 """
 
 from importlib.util import find_spec
@@ -21,6 +21,8 @@ def from_setup(setup: TransportSetup) -> Transport:
         MissingPackage: the library is not installed.
     """
     options = read_options(setup)
+    if options.scheme == "whep" and find_spec("aiortc") is None:
+        raise MissingPackage(missing("camera with WHEP needs", "aiortc", "whep"))
     if find_spec("av") is None:
         raise MissingPackage(missing("camera needs", "av", "video"))
     from urc.transports.camera_transport import CameraTransport

@@ -10,14 +10,15 @@ from urc.transports.web_origin import Credentials, OptionReader, WebOrigin
 __all__ = ["CameraOptions", "read_options"]
 
 _RTSP_PORT, _RTSPS_PORT = 554, 322
-_SCHEMES = ("rtsp", "rtsps", "http", "https", "udp")
+_SCHEMES = ("rtsp", "rtsps", "http", "https", "udp", "whep", "wheps")
+_LOGINS = ("digest", "basic", "bearer")
 
 
 class CameraOptions(NamedTuple):
     """The checked options of a camera transport."""
 
     scheme: str
-    """``rtsp``, ``http`` or ``udp``; the member `place` tells whether the connection uses TLS."""
+    """``rtsp``, ``http``, ``udp`` or ``whep``; the member `place` tells whether TLS is used."""
     place: WebOrigin
     """Target of the connection. For ``udp``, the host is the local address, or "" for all."""
     credentials: Credentials | None
@@ -56,11 +57,15 @@ def read_options(setup: TransportSetup) -> CameraOptions:
         if options.credentials(("digest", "basic")) is not None:
             raise TransportError("camera: a stream over udp has no sign-in; remove auth")
         return CameraOptions("udp", _listener(url), None, "udp", sender, None)
-    plain = "rtsp" if scheme.startswith("rtsp") else "http"
+    plain = scheme.removesuffix("s")
     place = options.place(plain)
     if plain == "rtsp" and urlsplit(url).port is None:
         place = place._replace(port=_RTSPS_PORT if place.is_secure else _RTSP_PORT)
-    credentials = options.credentials(("digest", "basic"))
+    if plain == "http" and place.path.endswith("/whep"):
+        raise TransportError(f"camera: for WHEP, url must begin with whep{scheme[4:]}://")
+    credentials = options.credentials(_LOGINS)
+    if plain == "rtsp" and credentials is not None and credentials.kind == "bearer":
+        raise TransportError("camera: auth with a token has no effect with an rtsp:// url")
     return CameraOptions(plain, place, credentials, over, "", options.tls(place))
 
 

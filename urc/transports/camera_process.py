@@ -4,12 +4,10 @@
 library written in C parses the bytes of a camera, so the parser has a process of its own. A hostile
 or stuck stream can neither block nor crash the server, and the system limits its memory. The
 process opens no connection to the network: the stream arrives on standard input or through the
-relay of URC.
+relay of URC. Only the datagrams of WHEP have sockets in this process (`urc.transports.whep_line`).
 
-The first line of standard input is a `DemuxJob` as JSON. Standard output contains records: length
-(u32) and kind (u8), then the content. The kind ``U`` is an access unit as the value of a signal
-(`urc.video`). The kind ``N`` is a line for the log. The kind ``F`` is a fault in one line, and the
-last record.
+The first line of standard input is a `DemuxJob` as JSON. Standard output contains the records of
+`urc.transports.camera_records`.
 """
 
 import json
@@ -18,34 +16,23 @@ import struct
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Iterable
 from io import RawIOBase
-from typing import Any, BinaryIO, Final, NamedTuple
+from typing import Any, BinaryIO, Final
 
-from urc.capture_clock import CaptureClock, step_words
-from urc.video import VideoUnit, encode_unit
+from urc.transports.camera_records import (
+    FAULT,
+    CapturedUnits,
+    DemuxJob,
+    UnitQueue,
+    put_units,
+    record_of,
+)
+from urc.video import VideoUnit
 from urc.video_reader import UnitReader, VideoFault
 
-__all__ = [
-    "FAULT",
-    "NOTE",
-    "RECORD",
-    "UNIT",
-    "CapturedUnits",
-    "DemuxJob",
-    "UnitQueue",
-    "capture_s",
-    "main",
-]
+__all__ = ["capture_s", "main"]
 
-RECORD: Final = struct.Struct(">Ic")
-UNIT: Final = b"U"
-FAULT: Final = b"F"
-NOTE: Final = b"N"
-QUEUE_BYTES: Final = 8_388_608
-QUEUE_UNITS: Final = 240
-"""Maximum number of queued access units: the oldest group of pictures is dropped first."""
 MEMORY_BYTES: Final = 2**31
 """Address space of this process; the libraries need 0.5 GB of it before they start."""
 PROBE_BYTES: Final = 500_000
@@ -54,88 +41,9 @@ PROBE_US: Final = 500_000
 _NETWORK_S: Final = 0.005
 """Wait for a packet that shows that the library has no more packets in stock, in seconds."""
 _MOST_EARLY: Final = 200
-_MOST_REORDERED_S: Final = 0.5
-"""Time by which an image may be captured before the previous one, because of B-frames."""
-_OLDEST_S: Final = 50.0
-"""Highest age before arrival, in seconds; the server does not believe times that are much older."""
 _REFERENCE: Final = struct.Struct("=q")
 _CODECS: Final = {"h264": False, "hevc": True}
 """Whether the codec is H.265, keyed by the library's name."""
-
-
-class DemuxJob(NamedTuple):
-    """A description of the stream to read."""
-
-    url: str = ""
-    """Address of the relay, for RTSP; "" for a stream on standard input."""
-    format: str = ""
-    """Name of the library's demuxer; "" to detect it among the permitted formats."""
-    over: str = "tcp"
-    """Whether RTP packets travel over ``tcp`` or ``udp``."""
-
-
-class UnitQueue:
-    """A bounded queue of records between the demuxer and standard output.
-
-    The demuxer never waits: a slow reader loses whole groups of pictures, oldest first. A group
-    without its beginning could not be decoded.
-    """
-
-    def __init__(self, max_units: int = QUEUE_UNITS, max_bytes: int = QUEUE_BYTES) -> None:
-        self._max_units = max_units
-        self._max_bytes = max_bytes
-        self._units: deque[tuple[bool, bytes]] = deque()
-        self._bytes = 0
-        self._needs_key = True
-        self._told = b""
-        self._changed = threading.Condition()
-        self._is_over = False
-
-    def put(self, record: bytes, *, is_key: bool) -> None:
-        """Add an access unit; drop older groups, or this unit, if the queue is full."""
-        with self._changed:
-            if is_key:
-                self._needs_key = False
-            elif self._needs_key:
-                return
-            is_full = len(self._units) >= self._max_units or (
-                self._bytes + len(record) > self._max_bytes
-            )
-            if is_full:
-                self._units.clear()
-                self._bytes = 0
-                if not is_key:
-                    self._needs_key = True
-                    return
-            self._units.append((is_key, record))
-            self._bytes += len(record)
-            self._changed.notify()
-
-    def tell(self, record: bytes) -> None:
-        """Add a record that is no access unit; a newer one replaces it."""
-        with self._changed:
-            self._told = record
-            self._changed.notify()
-
-    def take(self) -> bytes | None:
-        """Return the next record, after a wait if necessary; None at the end."""
-        with self._changed:
-            while not self._units:
-                if self._told:
-                    told, self._told = self._told, b""
-                    return told
-                if self._is_over:
-                    return None
-                self._changed.wait()
-            _, record = self._units.popleft()
-            self._bytes -= len(record)
-            return record
-
-    def end(self) -> None:
-        """Make `take` return None after the remaining records."""
-        with self._changed:
-            self._is_over = True
-            self._changed.notify()
 
 
 class EarlyUnits:
@@ -172,28 +80,6 @@ class EarlyUnits:
             older_s = max(0.0, min(older_s, end_s - self._opened_s))
             found.append(unit._replace(time_s=end_s - older_s))
         return found
-
-
-class CapturedUnits:
-    """Makes units older as their times of capture state; see `urc.capture_clock`.
-
-    An RTSP camera states its clock in RTCP sender reports, every few seconds. The library then
-    computes the time of each image on this clock. Images before the first report have only their
-    time of arrival, and so have all images of other streams.
-    """
-
-    def __init__(self) -> None:
-        """Begin without a time of capture."""
-        self._clock = CaptureClock(_MOST_REORDERED_S)
-
-    def aged(self, unit: VideoUnit, captured_s: float | None, queue: "UnitQueue") -> VideoUnit:
-        """Return the unit with its age in its time; put a line about a clock step into `queue`."""
-        if captured_s is None:
-            return unit
-        age = self._clock.age(captured_s, unit.time_s)
-        if age.step_s:
-            queue.tell(_record(NOTE, step_words(age.step_s).encode()))
-        return unit._replace(time_s=unit.time_s - min(age.older_s, _OLDEST_S))
 
 
 def capture_s(packet: Any) -> float | None:
@@ -280,21 +166,16 @@ def _read_stream(
         came_s = time.monotonic()
         has_data = packet.size > 0  # the filter empties the packet
         if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
-            _put(early.stamped(), queue)
+            put_units(early.stamped(), queue)
         captured_s = capture_s(packet)  # the filter drops it
         packets: Iterable[Any] = [packet] if convert is None else convert.filter(packet)
         for one in packets if has_data else ():
             unit = reader.unit(bytes(one), came_s)
             if unit is not None and early.is_over:
-                _put([dated.aged(unit, captured_s, queue)], queue)
+                put_units([dated.aged(unit, captured_s, queue)], queue)
             elif unit is not None:
                 early.add(unit, None if one.pts is None else float(one.pts * one.time_base))
         asked_s = time.monotonic()
-
-
-def _put(units: Iterable[VideoUnit], queue: UnitQueue) -> None:
-    for unit in units:
-        queue.put(_record(UNIT, encode_unit(unit)), is_key=unit.is_key)
 
 
 def _has_start_code(data: bytes) -> bool:
@@ -322,10 +203,6 @@ def _words(av: Any, fault: Exception) -> str:
     return f"the stream cannot be read ({getattr(fault, 'strerror', fault)})"
 
 
-def _record(kind: bytes, content: bytes) -> bytes:
-    return RECORD.pack(len(content), kind) + content
-
-
 def _limit_memory() -> None:
     if sys.platform == "linux":
         import resource
@@ -350,31 +227,48 @@ def _write_all(queue: UnitQueue, target: BinaryIO) -> None:
         os._exit(0)  # the server has closed the pipe
 
 
+def _line(source: RawIOBase) -> bytes:
+    """Return the next line of standard input; b"" at its end."""
+    line = bytearray()
+    while not line.endswith(b"\n"):
+        piece = source.read(1)
+        if not piece:
+            return b""
+        line += piece
+    return bytes(line)
+
+
+def _read(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
+    if job.hosts:
+        from urc.transports.whep_receiver import read_whep  # the extra `whep`
+
+        read_whep(job, lambda: _line(source), lambda: _end_with(source), queue)
+        return
+    if job.url:
+        threading.Thread(target=_end_with, args=(source,), daemon=True).start()
+    read_units(job, source, queue)
+
+
 def main() -> int:
     """Run the process; return the exit code."""
     _limit_memory()
     source, target = os.fdopen(0, "rb", buffering=0), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # so that no library's text reaches the records
-    line = bytearray()
-    while not line.endswith(b"\n"):
-        piece = source.read(1)
-        if not piece:
-            return 0
-        line += piece
+    line = _line(source)
+    if not line:
+        return 0
     job, queue = DemuxJob(**json.loads(line)), UnitQueue()
     writer = threading.Thread(target=_write_all, args=(queue, target), daemon=True)
     writer.start()
-    if job.url:
-        threading.Thread(target=_end_with, args=(source,), daemon=True).start()
     try:
-        read_units(job, source, queue)
+        _read(job, source, queue)
     except VideoFault as fault:
-        queue.put(_record(FAULT, str(fault).encode()), is_key=True)
+        queue.put(record_of(FAULT, str(fault).encode()), is_key=True)
     except MemoryError:
-        queue.put(_record(FAULT, b"the stream needs too much memory"), is_key=True)
+        queue.put(record_of(FAULT, b"the stream needs too much memory"), is_key=True)
     except Exception as bug:  # supervisor: the server reports the reason
         text = f"the stream cannot be read ({type(bug).__name__}: {bug})"
-        queue.put(_record(FAULT, text.encode()), is_key=True)
+        queue.put(record_of(FAULT, text.encode()), is_key=True)
     queue.end()
     writer.join(2.0)
     return 0

@@ -20,12 +20,13 @@ from urc.transports._faults import CLOSED, one_line
 from urc.transports._stream_dialer import StreamDialer
 from urc.transports.base import NOTICE, PeerClosed, TransportError
 from urc.transports.camera_options import CameraOptions
-from urc.transports.camera_process import FAULT, NOTE, RECORD, DemuxJob
+from urc.transports.camera_records import FAULT, NOTE, OFFER, RECORD, DemuxJob
 from urc.transports.camera_relay import RtspRelay, RtspWatch
 from urc.transports.http_body import fault_of
 from urc.transports.http_client import HttpClient
 from urc.transports.udp import UdpTransport
 from urc.transports.web_dial import Dialer
+from urc.transports.whep_exchange import WhepExchange
 from urc.video import MAX_UNIT_BYTES
 
 __all__ = ["CameraTransport"]
@@ -130,6 +131,7 @@ class _CameraConnection:
         self._relay: RtspRelay | None = None
         self._reason = ""
         self._started = asyncio.Event()
+        self._offer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         self._has_unit = False
 
     async def use_relay(self, relay: RtspRelay, job: DemuxJob) -> None:
@@ -161,6 +163,11 @@ class _CameraConnection:
         await self.write(json.dumps(job._asdict()).encode() + b"\n")
         self._started.set()
 
+    async def offer(self, job: DemuxJob) -> bytes:
+        """Start the process, and return its offer of WHEP, which `unit` receives."""
+        await self.start(job)
+        return await self._offer
+
     async def write(self, data: bytes) -> None:
         """Pass bytes of the stream to the process, and wait until they are taken.
 
@@ -186,13 +193,15 @@ class _CameraConnection:
         try:
             async with asyncio.timeout(limit_s):
                 await self._started.wait()
-                record = await self._record()
+                while (record := await self._record()) is None:
+                    pass
         except TimeoutError as fault:
             raise PeerClosed(f"{self._address} sent no image for {limit_s:g} s") from fault
         self._has_unit = True
         return record
 
-    async def _record(self) -> Payload:
+    async def _record(self) -> Payload | None:
+        """Return the next access unit or notice; None for a record of another kind."""
         process = self._process
         if process is None or process.stdout is None:
             raise PeerClosed(self._why())
@@ -208,6 +217,10 @@ class _CameraConnection:
             raise PeerClosed(self._why(one_line(content.decode("utf-8", "replace"), 300)))
         if kind == NOTE:
             return Envelope(NOTICE, {}, one_line(content.decode("utf-8", "replace"), 300))
+        if kind == OFFER:
+            if not self._offer.done():
+                self._offer.set_result(content)
+            return None
         return content
 
     def _why(self, said: str = "") -> str:
@@ -254,7 +267,7 @@ class _CameraConnection:
 async def _connected(options: CameraOptions, timeout_s: float) -> _CameraConnection:
     """Return an open connection within `timeout_s` seconds, or raise `ConnectFailed`."""
     connection = _CameraConnection(options.address)
-    start = {"rtsp": _start_rtsp, "http": _start_http, "udp": _start_udp}[options.scheme]
+    start = _STARTS[options.scheme]
     try:
         await start(connection, options, timeout_s)
     except BaseException:
@@ -343,3 +356,29 @@ async def _start_udp(
         await read()
 
     connection.feed(listen())
+
+
+async def _start_whep(
+    connection: _CameraConnection, options: CameraOptions, timeout_s: float
+) -> None:
+    exchange = WhepExchange(options)
+    ends = await exchange.reach(timeout_s)
+
+    async def converse() -> None:
+        try:
+            offer = await connection.offer(DemuxJob(hosts=ends.hosts, own_hosts=ends.own_hosts))
+            answer = await exchange.answer(offer, ends.hosts)
+            await connection.write(json.dumps(answer._asdict()).encode() + b"\n")
+            await asyncio.Event().wait()  # until `close`: the stream comes in the process's records
+        finally:
+            await exchange.close()
+
+    connection.feed(converse())
+
+
+_STARTS: Final = {
+    "rtsp": _start_rtsp,
+    "http": _start_http,
+    "udp": _start_udp,
+    "whep": _start_whep,
+}

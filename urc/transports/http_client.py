@@ -17,7 +17,14 @@ import httpx2
 
 from urc.transports._faults import HUNG_UP, late, one_line
 from urc.transports._stream import TcpStream
-from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError, unsent_of
+from urc.transports.base import (
+    ByteStream,
+    ConnectFailed,
+    PeerClosed,
+    TransportError,
+    ends_of,
+    unsent_of,
+)
 from urc.transports.web_dial import Dialer
 from urc.transports.web_origin import Credentials, WebOrigin
 
@@ -89,6 +96,14 @@ class HttpClient:
     async def reach(self, timeout_s: float = CONNECT_S) -> None:
         """Open a connection that the next request will use; raise `ConnectFailed` on failure."""
         await self._backend.reach(timeout_s)
+
+    def ends(self) -> tuple[str, str]:
+        """Return the IP addresses of both ends of the connection that `reach` has opened.
+
+        Raises:
+            ConnectFailed: the addresses are unknown, or the connection has ended.
+        """
+        return self._backend.ends()
 
     def request(
         self, method: str, path: str, headers: Mapping[str, str], body: bytes | None
@@ -291,6 +306,9 @@ class _Backend(httpcore2.AsyncNetworkBackend):
     async def reach(self, timeout_s: float) -> None:
         await self.close()
         self._spare = await self._dialer.stream(timeout_s)
+
+    def ends(self) -> tuple[str, str]:
+        return ends_of(self._spare)
 
     async def close(self) -> None:
         spare, self._spare = self._spare, None

@@ -10,14 +10,13 @@ from urc.cli.main import main
 from urc.images import MAX_PIXELS
 from urc.transports import camera
 from urc.transports.base import MissingPackage, Transport, TransportError, TransportSetup
-from urc.transports.camera_process import (
+from urc.transports.camera_process import EarlyUnits, capture_s
+from urc.transports.camera_records import (
     NOTE,
     QUEUE_BYTES,
     RECORD,
     CapturedUnits,
-    EarlyUnits,
     UnitQueue,
-    capture_s,
 )
 from urc.transports.camera_relay import RtspWatch
 from urc.video import MAX_UNIT_BYTES, VideoUnit

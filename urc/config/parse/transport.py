@@ -37,6 +37,8 @@ _OTHER_WORDS = {
     "ros2": "ros",
     "roslibjs": "ros",
     "rtsp": "camera",
+    "whep": "camera",
+    "webrtc": "camera",
     "video": "camera",
     "webcam": "camera",
 }
