@@ -13,6 +13,7 @@ import httpx2
 import pytest
 
 from tests.e2e.ports import free_port
+from tests.e2e.transports.certificates import Authority
 from tests.e2e.transports.hostile import Talk, bounded, liar
 from tests.e2e.transports.programs import listens, program
 from tests.e2e.transports.test_camera import assert_in_order, line, readers, reason, unit
@@ -139,6 +140,33 @@ async def test_candidates_of_another_host_get_no_packet() -> None:
     assert told.endswith(
         "but URC sends only to 127.0.0.1: add this address to the server's WebRTC addresses"
     )
+
+
+async def test_another_certificate_than_the_answer_says() -> None:
+    """As if somebody between the camera and URC had taken over the datagrams."""
+    async with whep_server("--wrong-hash") as (port, _), line(url=front(port)) as eye:
+        assert await reason(eye) == (
+            "the server's certificate does not match the fingerprint in its answer"
+        )
+
+
+async def test_https(tmp_path: Path) -> None:
+    authority = Authority(tmp_path)
+    async with whep_server("--pair", *authority.sign("127.0.0.1")) as (port, _):
+        url = front(port).replace("whep:", "wheps:")
+        async with line(url=url, tls={"ca": authority.file}) as eye:
+            await assert_streams(eye, 5)
+        with pytest.raises(ConnectFailed, match=r"from an unknown authority; see tls\.ca$"):
+            async with line(url=url):
+                pass
+
+
+async def test_ipv6() -> None:
+    async with (
+        whep_server("--host", "::1") as (port, _),
+        line(url=f"whep://[::1]:{port}/front/whep") as eye,
+    ):
+        await assert_streams(eye, 5)
 
 
 async def test_an_answer_without_h264() -> None:

@@ -2,6 +2,7 @@
 
     python whep_server.py PORT [--token TOKEN | --login USER:PASSWORD] [--codec CODEC]
                           [--candidates HOST] [--loss PERCENT] [--loss-again PERCENT]
+                          [--wrong-hash] [--pair CERTIFICATE KEY] [--host ADDRESS]
 
 The card has the stamp of tests/e2e/test_video_page.py: the number of the image in ten blocks.
 ``/front/whep`` is the stream, ``/moved/whep`` redirects to it, ``/away/whep`` to another host.
@@ -99,12 +100,18 @@ class Server:
         text = connection.localDescription.sdp
         if self.options.codec:
             text = text.replace("H264", self.options.codec)
+        if self.options.wrong_hash:
+            text = "\r\n".join(self._wrong(line) for line in text.split("\r\n"))
         if self.options.candidates:
             text = "\r\n".join(self._elsewhere(line) for line in text.split("\r\n"))
         name = f"s{len(self.sessions)}-{random.getrandbits(32):08x}"
         self.sessions[name] = connection
         place = f"/front/whep/{name}"
         return Response(text, 201, {"Location": place}, media_type=SDP)
+
+    def _wrong(self, line: str) -> str:
+        is_hash = line.startswith("a=fingerprint:")
+        return line[:-2] + ("00" if line[-2:] != "00" else "01") if is_hash else line
 
     def _elsewhere(self, line: str) -> str:
         parts = line.split(" ")
@@ -164,11 +171,21 @@ def main() -> None:
     parser.add_argument("--login")
     parser.add_argument("--codec")
     parser.add_argument("--candidates")
+    parser.add_argument("--wrong-hash", action="store_true")
+    parser.add_argument("--pair", nargs=2, default=(None, None))
+    parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--loss", type=float, default=0.0)
     parser.add_argument("--loss-again", type=float, default=0.0)
     options = parser.parse_args()
     logging.disable(logging.CRITICAL)
-    uvicorn.run(Server(options).app(), host="127.0.0.1", port=options.port, log_level="critical")
+    uvicorn.run(
+        Server(options).app(),
+        host=options.host,
+        port=options.port,
+        log_level="critical",
+        ssl_certfile=options.pair[0],
+        ssl_keyfile=options.pair[1],
+    )
 
 
 if __name__ == "__main__":
