@@ -245,6 +245,41 @@ FULL: Final = (
 )
 
 
+async def heard(host: str) -> tuple[int, list[bytes], asyncio.DatagramTransport]:
+    """Listen on an address; return the port, the datagrams so far, and the socket."""
+    found: list[bytes] = []
+
+    class Ear(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
+            found.append(data)
+
+    loop = asyncio.get_running_loop()
+    socket, _ = await loop.create_datagram_endpoint(Ear, local_addr=(host, 0))
+    return socket.get_extra_info("sockname")[1], found, socket
+
+
+async def test_only_the_host_in_the_document_gets_packets() -> None:
+    """The answer names two addresses, and only one of them is the server's."""
+    ours, to_server, first = await heard("127.0.0.1")
+    theirs, to_other, second = await heard("127.0.0.2")
+    line_of = "a=candidate:1 1 udp {} {} {} typ host\r\n"
+    body = FULL.rpartition(b"a=candidate")[0]
+    body += line_of.format(2, "127.0.0.2", theirs).encode()
+    body += line_of.format(1, "127.0.0.1", ours).encode()
+    try:
+        async with (
+            liar(answered(CREATED.format(len(body)), body)) as port,
+            line(url=front(port)) as eye,
+        ):
+            told = await reason(eye)
+    finally:
+        first.close()
+        second.close()
+    assert told.startswith(f"no answer over UDP from 127.0.0.1 port {ours}: ")
+    assert to_server
+    assert to_other == []
+
+
 @pytest.mark.parametrize(
     ("talk", "said"),
     [
