@@ -222,8 +222,8 @@ class Signal(NamedTuple):
     has_capture_time: bool = True
     """Whether the time of capture in an image's message can make the image older."""
     frozen_after_s: float = 0.0
-    """Time in seconds after which images with the same bytes count as one old image; 0 means
-    never."""
+    """Time in seconds after which equal images count as one old image; 0 means never. Images are
+    equal if their bytes are, and images of a video if their decoded images are."""
 
     @property
     def inputs(self) -> frozenset[str]:

@@ -1,7 +1,7 @@
 """Cameras that repeat the same image, although new messages arrive.
 
 Layer 4. Pure. A camera whose sensor or encoder has stopped may send its last image for ever, each
-time as a new message. The images of a real sensor differ, because of its noise. If a signal
+time as a new message. The images of a real sensor differ, because of its noise. If an image
 declares ``frozen_after``, images with the same bytes count as one image, as soon as they have
 arrived for this time. Its age counts from its first arrival.
 """
@@ -25,19 +25,21 @@ class Aged(NamedTuple):
 
 
 class RepeatedImages:
-    """The images that are being repeated, among the signals with ``frozen_after``."""
+    """The images that are being repeated, among those with ``frozen_after``."""
 
     def __init__(self, signals: Mapping[str, Signal]) -> None:
         """Begin without images."""
         self._after_s = {
-            name: one.frozen_after_s for name, one in signals.items() if one.frozen_after_s
+            name: one.frozen_after_s
+            for name, one in signals.items()
+            if one.frozen_after_s and one.type == "image"
         }
         self._first: dict[str, Sample] = {}
         """First sample with the newest image, keyed by signal."""
         self._repeated: set[str] = set()
 
     def __bool__(self) -> bool:
-        """Return whether some signal declares ``frozen_after``."""
+        """Return whether some image declares ``frozen_after``."""
         return bool(self._after_s)
 
     def __contains__(self, signal: str) -> bool:

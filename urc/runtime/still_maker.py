@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from typing import Any, Final
 
 from urc._extras import missing
-from urc.runtime.still_process import MADE, TAKEN
+from urc.runtime.still_process import MADE, TAKEN, Still
 
 __all__ = ["StillMaker"]
 
@@ -30,15 +30,19 @@ log = logging.getLogger(__name__)
 class StillMaker:
     """The process that makes the JPEG images of one video, restarted if it ends."""
 
-    def __init__(self, name: str, made: Callable[[str, bytes, float], None]) -> None:
+    def __init__(
+        self, name: str, made: Callable[[str, Still], None], frozen_after_s: float = 0.0
+    ) -> None:
         """Create a maker; `start` runs the process.
 
         Args:
             name: name of the signal.
-            made: function that receives the name, a JPEG file and its time of arrival in seconds.
+            made: function that receives the name and an image.
+            frozen_after_s: time in seconds after which equal images count as one; 0 means never.
         """
         self._name = name
         self._made = made
+        self._frozen_after_s = frozen_after_s
         self._process: asyncio.subprocess.Process | None = None
         self._task: asyncio.Task[None] | None = None
         self._needs_key = True
@@ -83,7 +87,7 @@ class StillMaker:
         if sys.platform == "win32":
             more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
         process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", "urc.runtime.still_process"),
+            *(sys.executable, "-P", "-m", "urc.runtime.still_process", f"{self._frozen_after_s}"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -93,10 +97,12 @@ class StillMaker:
         self._process, self._needs_key = process, True
         try:
             while process.stdout is not None:
-                size, time_s = MADE.unpack(await process.stdout.readexactly(MADE.size))
+                head = await process.stdout.readexactly(MADE.size)
+                size, time_s, is_repeated = MADE.unpack(head)
                 if size > _LARGEST:
                     raise ValueError("an image is too large")
-                self._made(self._name, await process.stdout.readexactly(size), time_s)
+                image = await process.stdout.readexactly(size)
+                self._made(self._name, Still(time_s, image, is_repeated))
         finally:
             self._process = None
             with suppress(ProcessLookupError):

@@ -188,8 +188,9 @@ class BrowserClient:
     # Writing
 
     async def _write(self, live: LiveSession) -> None:
-        profile = self._service.robot.profile
-        hello = wire.encode_hello(profile, live.number, self._service.clock.now())
+        robot, now_s = self._service.robot, self._service.clock.now()
+        is_playback = robot.playback is not None
+        hello = wire.encode_hello(robot.profile, live.number, now_s, is_playback=is_playback)
         await self._line.send_text(hello)
         self._live = live
         while True:

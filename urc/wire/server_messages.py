@@ -84,6 +84,8 @@ class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     """The signal's axis convention; "" if unknown."""
     has_alarms: bool = False
     """Whether a limit or state of the signal can cause an alarm."""
+    frozen_after_s: float | None = None
+    """Time in seconds after which equal images of a video count as one image; None means never."""
 
 
 class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):

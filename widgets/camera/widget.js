@@ -260,7 +260,7 @@ class Camera {
     const isShown = reading !== undefined && reading.value !== null;
     const nowS = performance.now() / 1000;
     const ageS = isShown ? nowS - reading.time : 0;
-    const isRepeated = isShown && reading.image?.isRepeated === true;
+    const isRepeated = isShown && (reading.image?.isRepeated === true || reading.video?.firstNumber !== undefined);
     const isFrozen = isRepeated || (isShown && ageS >= this.freeze);
     attribute(this.root, "data-frozen", isFrozen ? "yes" : null);
     const rate = this.rate && !isFrozen ? `${this.rate.perSecond(nowS).toFixed(0)} /s` : "";

@@ -10,7 +10,7 @@ from PIL import Image
 
 from tests.unit.test_video import encoded
 from urc.runtime.still_maker import StillMaker
-from urc.runtime.still_process import EVERY_S, WIDEST, stills
+from urc.runtime.still_process import EVERY_S, WIDEST, Still, stills
 from urc.video import VideoUnit, encode_unit
 
 pytestmark = pytest.mark.anyio
@@ -44,15 +44,16 @@ def test_at_most_ten_images_a_second_with_their_times(codec: str) -> None:
     units = film(codec=codec)
     made = list(stills(iter(units)))
     assert 8 <= len(made) <= 11
-    times = [time_s for time_s, _ in made]
+    times = [one.time_s for one in made]
     assert all(later - earlier >= EVERY_S * 0.9 for earlier, later in pairwise(times))
-    for _, image in made:
+    for _, image, is_repeated in made:
+        assert not is_repeated
         assert opened(image).format == "JPEG"
         assert opened(image).size == (320, 240)
 
 
 def test_a_large_image_is_scaled() -> None:
-    image = next(stills(iter(film(1920, 1080, 2))))[1]
+    image = next(stills(iter(film(1920, 1080, 2)))).image
     assert opened(image).size == (WIDEST, 720)
 
 
@@ -71,17 +72,17 @@ def test_a_gigantic_image_is_not_decoded() -> None:
 
 
 async def test_the_process_makes_images_and_ends_with_the_maker() -> None:
-    made: list[tuple[str, bytes, float]] = []
-    maker = StillMaker("eye", lambda *one: made.append(one))
+    made: list[tuple[str, Still]] = []
+    maker = StillMaker("eye", lambda *one: made.append(one), frozen_after_s=2.5)
     maker.start()
     async with asyncio.timeout(WAIT_S):
         while not made:
             for unit in film(count=4):
                 maker.take(encode_unit(unit), is_key=unit.is_key)
             await asyncio.sleep(0.1)
-    name, image, time_s = made[0]
-    assert (name, opened(image).size) == ("eye", (320, 240))
-    assert 100.0 <= time_s < 101.0
+    name, still = made[0]
+    assert (name, opened(still.image).size) == ("eye", (320, 240))
+    assert 100.0 <= still.time_s < 101.0
     process = maker._process
     assert process is not None
     await maker.stop()
@@ -90,7 +91,7 @@ async def test_the_process_makes_images_and_ends_with_the_maker() -> None:
 
 async def test_a_killed_process_is_started_again() -> None:
     made: list[float] = []
-    maker = StillMaker("eye", lambda _name, _image, time_s: made.append(time_s))
+    maker = StillMaker("eye", lambda _name, still: made.append(still.time_s))
     maker.start()
     try:
         for _ in range(2):

@@ -8,6 +8,7 @@ import pytest
 
 from urc.model.values import Sample, Signal
 from urc.runtime.hub import Hub
+from urc.runtime.still_process import Still
 from urc.testing.clock import FakeClock, settle
 from urc.video import VideoUnit, encode_unit, read_unit
 from urc.web.feed import video_stills
@@ -16,7 +17,7 @@ from urc.web.feed.video_feed import GROUP_BYTES, VideoFeed, VideoSubscription
 from urc.web.wire import messages as wire
 from urc.web.wire.picture import encode_video
 from urc.wire.client_messages import ImageSelection
-from urc.wire.picture import VIDEO_HEADER, read_picture
+from urc.wire.picture import PICTURE, REPEATED, VIDEO_HEADER, read_picture
 
 NAMES = ("front", "rear")
 
@@ -212,8 +213,11 @@ class FakeMaker:
 
     started: list[str] = []  # noqa: RUF012 - shared by all makers of one test
 
-    def __init__(self, name: str, made: Callable[[str, bytes, float], None]) -> None:
+    def __init__(
+        self, name: str, made: Callable[[str, Still], None], frozen_after_s: float
+    ) -> None:
         self.name = name
+        self.frozen_after_s = frozen_after_s
         self.made = made
         self.taken: list[tuple[bytes, bool]] = []
 
@@ -233,7 +237,7 @@ async def test_only_pages_that_cannot_decode_get_jpeg_images(
     """One maker serves all of them, the log tells of it, and it ends with the last page."""
     monkeypatch.setattr(video_stills, "StillMaker", FakeMaker)
     monkeypatch.setattr(FakeMaker, "started", [])
-    hub, clock = Hub({"eye": Signal("eye", "video")}), FakeClock()
+    hub, clock = Hub({"eye": Signal("eye", "video", frozen_after_s=2.0)}), FakeClock()
     fanout = Fanout(hub, clock=clock)
     decoding, first, second = Place(), Place(), Place()
     fanout.show(decoding, ["eye"])
@@ -247,9 +251,10 @@ async def test_only_pages_that_cannot_decode_get_jpeg_images(
         hub.publish([Sample("eye", unit, clock.now())])
     maker = fanout.stills._makers["eye"]
     assert isinstance(maker, FakeMaker)
+    assert maker.frozen_after_s == 2.0
     assert maker.taken == [(unit, True)]
     assert fanout.next_picture(first) is None
-    maker.made("eye", b"\xff\xd8\xff jpeg", clock.now() - 1.5)
+    maker.made("eye", Still(clock.now() - 1.5, b"\xff\xd8\xff jpeg"))
     for place in (first, second):
         frame = fanout.next_picture(place)
         assert frame is not None
@@ -259,6 +264,13 @@ async def test_only_pages_that_cannot_decode_get_jpeg_images(
     frame = fanout.next_picture(decoding)
     assert frame is not None
     assert parts(frame)[-1] == b"K1"
+    for is_repeated, kind in ((True, REPEATED), (False, PICTURE)):
+        maker.made("eye", Still(clock.now() - 90.0, b"\xff\xd8\xff same", is_repeated))
+        frame = fanout.next_picture(first)
+        assert frame is not None
+        message = read_picture(frame[2:])
+        assert message is not None
+        assert (frame[2], message.age_ms) == (kind, 90_000 if is_repeated else 0)
     fanout.show(first, ())
     await settle()
     assert FakeMaker.started == ["eye"]

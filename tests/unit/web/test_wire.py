@@ -94,6 +94,20 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
     }  # fmt: skip
 
 
+def test_hello_tells_which_videos_the_page_compares() -> None:
+    """The server itself compares images; a playback shows images again after a jump."""
+    driver = Driver(
+        signals={
+            "film": Signal("film", "video", frozen_after_s=2.0),
+            "front": Signal("front", "image", frozen_after_s=2.0),
+        }
+    )
+    profile = Profile("p", "P", "p.yaml", driver=driver)
+    for is_playback, wanted in ((False, [2.0, None]), (True, [None, None])):
+        hello = json.loads(wire.encode_hello(profile, "s1", 2.0, is_playback=is_playback))
+        assert [one.get("frozen_after_s") for one in hello["signals"]] == wanted
+
+
 def test_a_computed_signal_comes_from_where_its_inputs_come_from() -> None:
     """It is old when none of their lines is live, by way of others too."""
     driver = Driver(

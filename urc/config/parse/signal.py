@@ -213,17 +213,14 @@ def _has_capture_time(part: Node, kind: str, problems: Problems) -> bool:
 
 
 def _frozen_after_s(part: Node, kind: str, problems: Problems) -> float:
-    if kind != "image" and "frozen_after" in part.data:
-        is_video = kind == "video"
+    if kind not in _FILMED and "frozen_after" in part.data:
         problems.error(
             part,
             "misplaced-key",
             f"'frozen_after' has no effect for type {kind}",
             at="frozen_after",
             key=True,
-            hint="the data of a video differ, even if all its images are the same"
-            if is_video
-            else "this key needs 'type: image'",
+            hint="this key needs 'type: image' or 'type: video'",
         )
     return problems.duration(part, "frozen_after", 0.0, least=0.2, most=60)
 

@@ -17,7 +17,7 @@ from typing import Final
 from urc.guard.goal_reports import GoalReports
 from urc.model.payload import Payload
 from urc.model.profile import Profile
-from urc.model.values import Reading, Sample, Value
+from urc.model.values import Reading, Sample, Signal, Value
 from urc.problems import UrcError
 from urc.protocol.engine import Engine
 from urc.protocol.events import MotionEvent, Replied
@@ -267,12 +267,17 @@ class Player:
             hub.publish(tuple(samples))
 
 
+def _uncompared(signal: Signal) -> Signal:
+    """Return a signal whose video is not compared, because a jump shows its images again."""
+    return signal._replace(frozen_after_s=0.0) if signal.type == "video" else signal
+
+
 class PlaybackSession:
     """A session that plays a recording; the session refuses every command."""
 
     def __init__(self, profile: Profile, settings: Mapping[str, Value]) -> None:
         """Create a session without values."""
-        self.hub = Hub(profile.driver.signals)
+        self.hub = Hub({name: _uncompared(one) for name, one in profile.driver.signals.items()})
         self.frames: MotionFrames = Engine(profile.driver, settings).motions
         self.backend: MotionBackend | None = None
         self.on_motion: Callable[[MotionEvent], None] | None = None

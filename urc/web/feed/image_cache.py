@@ -61,6 +61,8 @@ class ImageCache:
         self._clock = clock
         self.stills: dict[str, Sample] = {}
         """Newest JPEG image of each video that some page cannot decode."""
+        self.repeated: set[str] = set()
+        """Videos among `stills` whose camera repeats the image."""
         self._encoded: dict[str, EncodedImage] = {}
         self._count = 0
 
@@ -95,7 +97,7 @@ class ImageCache:
         age_s, index = now_s - sample.time_s, self._hub.index[name]
         message = encode_picture(
             *(index, sample.value, number, round(age_s * 1000), round(now_s * 1000)),
-            is_repeated=name in self._hub.repeated,
+            is_repeated=name in (self.repeated if is_video else self._hub.repeated),
         )
         made = self._encoded[name] = EncodedImage(as_frame(message), sample, number, now_s)
         return made

@@ -11,6 +11,7 @@ from urc.model.values import Sample
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub, LogEntry
 from urc.runtime.still_maker import StillMaker
+from urc.runtime.still_process import Still
 from urc.video import VideoUnit
 from urc.web.feed.image_cache import ImageCache
 from urc.web.feed.video_feed import VideoFeed
@@ -21,6 +22,8 @@ _REASON: Final = (
     "a page cannot decode this video and receives at most 10 JPEG images a second; the page needs"
     " HTTPS, and the camera H.264"
 )
+_LATE_S: Final = 60.0
+"""Longest credible time between the arrival of an image and its JPEG file, in seconds."""
 
 
 class VideoStills:
@@ -75,7 +78,8 @@ class VideoStills:
         await asyncio.gather(*self._stopping, return_exceptions=True)
 
     def _begin(self, name: str) -> None:
-        maker = self._makers[name] = StillMaker(name, self._made)
+        after_s = self._hub.signals[name].frozen_after_s
+        maker = self._makers[name] = StillMaker(name, self._made, after_s)
         maker.start()
         self._hub.log(LogEntry(self._clock.now(), "info", name, _REASON))
 
@@ -84,15 +88,19 @@ class VideoStills:
         self._stopping.add(task)
         task.add_done_callback(self._stopping.discard)
         self._cache.stills.pop(name, None)
+        self._cache.repeated.discard(name)
 
     def _heard(self, name: str, value: bytes, unit: VideoUnit) -> None:
         maker = self._makers.get(name)
         if maker is not None:
             maker.take(value, is_key=unit.is_key)
 
-    def _made(self, name: str, image: bytes, time_s: float) -> None:
+    def _made(self, name: str, still: Still) -> None:
         if name in self._makers:
-            age_s = self._clock.now() - time_s
-            at_s = time_s if 0 <= age_s <= 60.0 else self._clock.now()
-            self._cache.stills[name] = Sample(name, image, at_s)
+            age_s = self._clock.now() - still.time_s
+            is_credible = age_s >= 0 and (age_s <= _LATE_S or still.is_repeated)
+            at_s = still.time_s if is_credible else self._clock.now()
+            self._cache.stills[name] = Sample(name, still.image, at_s)
+            change = self._cache.repeated.add if still.is_repeated else self._cache.repeated.discard
+            change(name)
             self._changed()

@@ -132,8 +132,11 @@ def decode(text: str | bytes) -> Inbound:
     return decoded(_decoder, text)
 
 
-def encode_hello(profile: Profile, session: str, now_s: float) -> str:
-    """Return the first message, which defines the meaning of all indexes."""
+def encode_hello(profile: Profile, session: str, now_s: float, *, is_playback: bool = False) -> str:
+    """Return the first message, which defines the meaning of all indexes.
+
+    The page does not compare the images of a playback, because a jump shows images again.
+    """
     sources = sources_of(profile.driver)
     signals = profile.driver.signals
     return encoded(
@@ -144,7 +147,10 @@ def encode_hello(profile: Profile, session: str, now_s: float) -> str:
             title=profile.title,
             now=milliseconds(now_s),
             names=tuple(signals),
-            signals=[_signal(signal, sources.get(name, ())) for name, signal in signals.items()],
+            signals=[
+                _signal(signal, sources.get(name, ()), is_playback=is_playback)
+                for name, signal in signals.items()
+            ],
             roles={name: one.role for name, one in profile.driver.commands.items()},
             controls=tuple(
                 name for name, one in profile.driver.commands.items() if one.hold is not None
@@ -275,7 +281,8 @@ def _plain(value: object) -> object:
     return cut(str(value))
 
 
-def _signal(signal: Signal, sources: tuple[str, ...]) -> SignalRow:
+def _signal(signal: Signal, sources: tuple[str, ...], *, is_playback: bool) -> SignalRow:
+    is_compared = signal.type == "video" and not is_playback
     limits = {
         name: value
         for name in ("lolo", "low", "high", "hihi")
@@ -295,4 +302,5 @@ def _signal(signal: Signal, sources: tuple[str, ...]) -> SignalRow:
         sources=sources,
         axes=signal.axes,
         has_alarms=not signal.limits.is_empty,
+        frozen_after_s=signal.frozen_after_s or None if is_compared else None,
     )

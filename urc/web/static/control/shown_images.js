@@ -15,6 +15,7 @@
  * @property {string} signal
  * @property {number} number Number of the image, from its message.
  * @property {number} timeMs Time of the image on this page's clock.
+ * @property {number | undefined} [firstNumber] Number of the earlier image that the camera repeats in this one.
  */
 
 export class ShownImages {
@@ -29,14 +30,14 @@ export class ShownImages {
    * @param {Numbered} image
    * @param {number} nowMs
    */
-  show({ signal, number, timeMs }, nowMs) {
+  show({ signal, number, timeMs, firstNumber }, nowMs) {
     const known = this.images.get(signal);
     if (known?.number === number) return;
     // Of two widgets with the same camera, the one with the newer image counts. A newer image can have an
     // earlier time: the camera may repeat its last image. Numbers begin again at 2^32.
     const isBehind = known && ((number - known.number) | 0) < 0;
     if (isBehind && known.timeMs > timeMs) return;
-    this.images.set(signal, { signal, number, timeMs, atMs: nowMs });
+    this.images.set(signal, { signal, number, timeMs, firstNumber, atMs: nowMs });
   }
 
   /** Forget all images, because a new connection numbers them anew. */
@@ -46,6 +47,7 @@ export class ShownImages {
 
   /**
    * Return what a tick reports: the number of the image, and for how long it has been shown, in milliseconds.
+   * An image that the camera repeats is as old as the first one, so the first one is named.
    *
    * @param {string} signal
    * @param {number} nowMs
@@ -53,7 +55,7 @@ export class ShownImages {
    */
   report(signal, nowMs) {
     const image = this.images.get(signal);
-    return image && [image.number, Math.max(0, Math.floor(nowMs - image.atMs))];
+    return image && [image.firstNumber ?? image.number, Math.max(0, Math.floor(nowMs - image.atMs))];
   }
 
   /**

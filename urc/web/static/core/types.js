@@ -25,6 +25,7 @@
  * @property {Partial<Record<"lolo" | "low" | "high" | "hihi", number>>} [limits]
  * @property {boolean} [has_alarms] Whether a limit or a state causes an alarm.
  * @property {number} [stale_after_s]
+ * @property {number} [frozen_after_s] Time after which equal images of a video count as one image.
  * @property {string[]} [sources]
  * @property {"FLU" | "FRD" | "ENU" | "NED" | "bearing"} [axes] Axis convention.
  * @property {number} [edition] Number of the server's state at the time of a conversion.
@@ -57,7 +58,8 @@
  * @property {number} serial Increases with each new image.
  * @property {string} signal
  * @property {number} number Number of its access unit.
- * @property {number} timeMs Time of the image on this page's clock.
+ * @property {number} timeMs Time of the image on this page's clock; of a repeated image, the first one's.
+ * @property {number | undefined} [firstNumber] Number of the image that the camera repeats.
  *
  * @typedef {object} Conversion Conversion from a signal's unit to another: value · factor + offset.
  * @property {number} factor

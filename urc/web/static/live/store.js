@@ -184,12 +184,13 @@ export class Store {
    * @param {ImageBitmap} bitmap
    * @param {number} timeMs
    * @param {number} number number of its access unit
+   * @param {number} [firstNumber] number of the image that the camera repeats
    */
-  videoImage(name, bitmap, timeMs, number) {
+  videoImage(name, bitmap, timeMs, number, firstNumber) {
     this.serial += 1;
     this.samples.get(name)?.video?.bitmap.close();
     const value = { bytes: bitmap.width * bitmap.height };
-    const video = { bitmap, serial: this.serial, signal: name, number, timeMs };
+    const video = { bitmap, serial: this.serial, signal: name, number, timeMs, firstNumber };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, video });
   }
 

@@ -2,18 +2,71 @@
 /**
  * Decoder of videos, outside the page's thread. A script without imports, because it runs in a worker.
  *
- * The page posts access units: {signal, number, isKey, codec, data}, and {signal, isOver: true} at the end of
- * a video. The worker posts images: {signal, number, bitmap}, and faults: {signal, fault}.
+ * The page posts access units: {signal, number, timeMs, isKey, codec, data, isCompared}, and {signal, isOver:
+ * true} at the end of a video. The worker posts images: {signal, number, bitmap}, and faults: {signal, fault}. Of
+ * compared videos, it also posts the checksums of each keyframe: {signal, number, timeMs, blocks}.
  */
 
 /** Number of waiting access units at which a keyframe replaces them: 0.4 s at 30 images a second. */
 const LATE_UNITS = 12;
 /** Number of waiting access units at which further ones are dropped until the next keyframe. */
 const MOST_UNITS = 300;
+/** Numbers of compared blocks in a row and in a column. */
+const [COLUMNS, ROWS] = [20, 15];
 
 /** Posts a message to the page. @param {object} message @param {Transferable[]} [moved] */
 function tell(message, moved = []) {
   /** @type {any} */ (globalThis).postMessage(message, moved);
+}
+
+/** Return the checksums of an image's blocks. @param {VideoFrame} frame */
+async function blocksOf(frame) {
+  try {
+    const data = new Uint8Array(frame.allocationSize());
+    const [brightness] = await frame.copyTo(data);
+    const { offset = 0, stride = 0 } = brightness ?? {};
+    return checksums(data.subarray(offset), stride, frame.visibleRect?.height ?? 0);
+  } catch {
+    return blocksOfPixels(frame); // a decoder may keep its images where a page cannot read them
+  }
+}
+
+/** @param {VideoFrame} frame */
+function blocksOfPixels(frame) {
+  const [width, height] = [frame.displayWidth, frame.displayHeight];
+  const pen = new OffscreenCanvas(width, height).getContext("2d", { willReadFrequently: true });
+  pen?.drawImage(frame, 0, 0);
+  const pixels = pen?.getImageData(0, 0, width, height);
+  return checksums(new Uint8Array(pixels?.data ?? []), 4 * width, pixels ? height : 0);
+}
+
+/**
+ * Return the checksums of 300 blocks with 8 rows of 8 bytes, spread over the image. They lie within the blocks
+ * of an encoder, whose edges depend on their neighbours. Noise of one bit changes a checksum.
+ *
+ * @param {Uint8Array} data
+ * @param {number} stride bytes from one row to the next
+ * @param {number} height
+ */
+function checksums(data, stride, height) {
+  const found = new Uint32Array(COLUMNS * ROWS);
+  if (stride < 16 || height < 16) return found.subarray(0, 0);
+  for (let block = 0; block < found.length; block += 1) {
+    const left = placeOf(block % COLUMNS, COLUMNS, stride);
+    const top = placeOf(Math.floor(block / COLUMNS), ROWS, height);
+    let hash = block;
+    for (let place = 0; place < 64; place += 1) {
+      const byte = data[(top + (place >> 3)) * stride + left + (place & 7)] ?? 0;
+      hash = Math.imul((hash << 5) ^ (hash >>> 27) ^ byte, 0x01000193);
+    }
+    found[block] = hash;
+  }
+  return found;
+}
+
+/** Return the first byte or row of a block. @param {number} number @param {number} count @param {number} size */
+function placeOf(number, count, size) {
+  return Math.floor((number * size) / count / 16) * 16 + 4;
 }
 
 class Video {
@@ -30,10 +83,12 @@ class Video {
     /** Newest decoded image that is not posted yet. @type {VideoFrame | null} */
     this.next = null;
     this.isPosting = false;
+    /** Times of the keyframes in the decoder that will be compared, by number. @type {Map<number, number>} */
+    this.keys = new Map();
   }
 
-  /** @param {{number: number, isKey: boolean, codec: string, data: ArrayBuffer}} unit */
-  take({ number, isKey, codec, data }) {
+  /** @param {{number: number, timeMs: number, isKey: boolean, codec: string, data: ArrayBuffer, isCompared: boolean}} unit */
+  take({ number, timeMs, isKey, codec, data, isCompared }) {
     if (this.needsKey && !isKey) return;
     const waiting = this.early?.length ?? this.decoder?.decodeQueueSize ?? 0;
     if (isKey && (codec !== this.codec || !this.decoder || waiting > LATE_UNITS)) this.begin(codec);
@@ -42,6 +97,7 @@ class Video {
       return;
     }
     this.needsKey = false;
+    if (isKey && isCompared) this.keys.set(number, timeMs);
     const chunk = new EncodedVideoChunk({ type: isKey ? "key" : "delta", timestamp: number, data });
     if (this.early) this.early.push(chunk);
     else this.decode(chunk);
@@ -99,6 +155,8 @@ class Video {
 
   /** Post an image, or keep only the newest one while an earlier image is being posted. @param {VideoFrame} frame */
   output(frame) {
+    const timeMs = this.keys.get(frame.timestamp);
+    if (timeMs !== undefined) void this.compare(frame.clone(), timeMs);
     this.next?.close();
     this.next = frame;
     if (!this.isPosting) void this.post();
@@ -118,6 +176,24 @@ class Video {
       }
     }
     this.isPosting = false;
+  }
+
+  /**
+   * Post the checksums of a keyframe.
+   *
+   * @param {VideoFrame} frame
+   * @param {number} timeMs
+   */
+  async compare(frame, timeMs) {
+    const number = frame.timestamp;
+    // A decoder that starts anew leaves earlier keyframes out.
+    for (const key of this.keys.keys()) if (key <= number) this.keys.delete(key);
+    try {
+      const blocks = await blocksOf(frame);
+      if (!this.isOver) tell({ signal: this.signal, number, timeMs, blocks });
+    } finally {
+      frame.close();
+    }
   }
 
   /**

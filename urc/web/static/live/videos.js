@@ -6,6 +6,7 @@
  * browser lacks, the page requests JPEG images instead.
  */
 import { scriptUrl } from "../core/trusted_scripts.js";
+import { StandingPictures } from "./standing_pictures.js";
 
 /** Number of faults of a video after which the page requests JPEG images. */
 const MOST_FAULTS = 3;
@@ -33,6 +34,8 @@ export class Videos {
     this.worker = null;
     /** Time of each access unit in the decoder, by signal and number. @type {Map<string, Map<number, number>>} */
     this.times = new Map();
+    /** Keyframes of compared videos; kept while a video is hidden. @type {Map<string, StandingPictures>} */
+    this.standing = new Map();
     /** Faults of each video, and the images since the last one. @type {Map<string, {count: number, images: number}>} */
     this.faults = new Map();
     /** Videos that the page cannot decode. @type {Set<string>} */
@@ -53,7 +56,14 @@ export class Videos {
     if (times.size >= MOST_TIMES) times.clear();
     times.set(number, timeMs);
     const data = frame.bytes.slice().buffer;
-    this.decoder().postMessage({ signal, number, isKey: video.isKey, codec: frame.type, data }, [data]);
+    const isCompared = this.frozenAfterMs(signal) > 0;
+    const unit = { signal, number, timeMs, isKey: video.isKey, codec: frame.type, data, isCompared };
+    this.decoder().postMessage(unit, [data]);
+  }
+
+  /** Return the time after which equal images count as one; 0 for never. @param {string} signal */
+  frozenAfterMs(signal) {
+    return (this.store.signals.get(signal)?.frozen_after_s ?? 0) * 1000;
   }
 
   /** Return the names of the shown videos that the page cannot decode. @param {readonly string[]} shown */
@@ -80,16 +90,20 @@ export class Videos {
     return worker;
   }
 
-  /** @param {{signal: string, number?: number, bitmap?: ImageBitmap, fault?: string}} told */
-  answer({ signal, number, bitmap, fault }) {
+  /** @param {{signal: string, number: number, timeMs?: number, bitmap?: ImageBitmap, blocks?: Uint32Array, fault?: string}} told */
+  answer({ signal, number, timeMs: keyMs, bitmap, blocks, fault }) {
+    if (blocks && keyMs !== undefined) {
+      this.standingOf(signal).add({ number, timeMs: keyMs, blocks });
+      return;
+    }
     if (fault !== undefined) {
       this.fail(signal, fault);
       return;
     }
     const times = this.times.get(signal);
     if (!bitmap) return;
-    const timeMs = times?.get(number ?? -1);
-    if (number === undefined || timeMs === undefined) {
+    const timeMs = times?.get(number);
+    if (timeMs === undefined) {
       bitmap.close();
       return;
     }
@@ -100,8 +114,17 @@ export class Videos {
     }
     const faults = this.faults.get(signal);
     if (faults && (faults.images += 1) >= FORGIVEN_AFTER) this.faults.delete(signal);
-    this.store.videoImage(signal, bitmap, timeMs, number);
+    const afterMs = this.frozenAfterMs(signal);
+    const first = afterMs > 0 ? this.standingOf(signal).first(timeMs, afterMs) : null;
+    this.store.videoImage(signal, bitmap, first?.timeMs ?? timeMs, number, first?.number);
     this.changed();
+  }
+
+  /** @param {string} signal */
+  standingOf(signal) {
+    const known = this.standing.get(signal) ?? new StandingPictures();
+    this.standing.set(signal, known);
+    return known;
   }
 
   /**
