@@ -14,7 +14,7 @@ import re
 import struct
 from typing import Final, NamedTuple
 
-__all__ = ["MAX_UNIT_BYTES", "VideoUnit", "encode_unit", "read_unit", "with_time"]
+__all__ = ["MAX_UNIT_BYTES", "VideoUnit", "arrival_s", "encode_unit", "read_unit", "with_time"]
 
 MAX_UNIT_BYTES: Final = 4_194_304
 """Maximum size of an access unit, in bytes; a keyframe of a 4K camera has about 1 MB."""
@@ -22,6 +22,9 @@ MAX_UNIT_BYTES: Final = 4_194_304
 _SIGN: Final = b"URCV"
 _HEADER: Final = struct.Struct(">4sBBHHd")
 _TIME: Final = struct.Struct(">d")
+_LATE_S: Final = 60.0
+"""Longest credible time between arrival and reading of a unit, in seconds. A unit may contain the
+arrival time of another computer."""
 _CODEC: Final = re.compile(rb"[A-Za-z0-9.]{3,40}")
 
 
@@ -51,6 +54,16 @@ def with_time(value: bytes, time_s: float) -> bytes:
     """Return an access unit in a signal's value with another time of arrival."""
     place = _HEADER.size - _TIME.size
     return value[:place] + _TIME.pack(time_s) + value[_HEADER.size :]
+
+
+def arrival_s(unit: VideoUnit, time_s: float) -> float:
+    """Return when a unit reached this computer, also if the server was held up afterwards.
+
+    Args:
+        unit: the access unit.
+        time_s: time of its reading, in monotonic seconds.
+    """
+    return unit.time_s if 0 <= time_s - unit.time_s <= _LATE_S else time_s
 
 
 def read_unit(value: bytes) -> VideoUnit | None:

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 __all__ = [
     "COMPRESSED_IMAGE",
+    "COMPRESSED_VIDEO",
     "FRAME_TRANSFORMS",
     "LASER_SCAN",
     "LOCATION_FIX",
@@ -53,6 +54,13 @@ _POSE: Final = _message("Pose", position=_VECTOR, orientation=_ROTATION)
 
 COMPRESSED_IMAGE: Final = _message(
     "CompressedImage",
+    timestamp=_TIME,
+    frame_id=_TEXT,
+    data={"type": "string", "contentEncoding": "base64"},
+    format=_TEXT,
+)
+COMPRESSED_VIDEO: Final = _message(
+    "CompressedVideo",
     timestamp=_TIME,
     frame_id=_TEXT,
     data={"type": "string", "contentEncoding": "base64"},

@@ -1,7 +1,7 @@
 """Readings, log entries and connection states as JSON messages with JSON Schemas.
 
 Layer 4. Pure. Recordings and the Foxglove server share this mapping, so a viewer shows both in the
-same way. Images, point clouds and the log use Foxglove's standard messages.
+same way. Images, videos, point clouds and the log use Foxglove's standard messages.
 
 Viewers read the fields of a message from its schema. Each property in a schema therefore has a
 ``type``, or the alternatives of an enumeration. A property without a type makes some viewers reject
@@ -22,9 +22,10 @@ from urc.model.driver import Argument
 from urc.model.values import BINARY_TYPES, PICTURE_TYPES, Alarm, Sample, Signal
 from urc.protocol.values.convert import BadValue
 from urc.runtime.cloud_messages import cloud_fields
-from urc.runtime.foxglove_schemas import COMPRESSED_IMAGE, POINT_CLOUD
+from urc.runtime.foxglove_schemas import COMPRESSED_IMAGE, COMPRESSED_VIDEO, POINT_CLOUD
 from urc.runtime.foxglove_schemas import LOG as FOXGLOVE_LOG
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry
+from urc.video import VideoUnit, arrival_s, read_unit
 
 __all__ = [
     "LEVELS",
@@ -45,6 +46,8 @@ __all__ = [
 LEVELS: Final = {"info": 2, "warning": 3, "error": 4}
 """Levels of ``foxglove.Log``."""
 _SECOND_NS: Final = 1_000_000_000
+_HEVC: Final = ("hev1", "hvc1")
+"""Beginnings of the codec strings of H.265."""
 _TEXT: Final = {"type": "string"}
 _WHOLE: Final = {"type": "integer"}
 
@@ -77,6 +80,7 @@ LINK_SCHEMA: Final = object_schema(
 )
 LOG_SCHEMA: Final = MessageSchema("foxglove.Log", FOXGLOVE_LOG)
 _IMAGE_SCHEMA: Final = MessageSchema("foxglove.CompressedImage", COMPRESSED_IMAGE)
+_VIDEO_SCHEMA: Final = MessageSchema("foxglove.CompressedVideo", COMPRESSED_VIDEO)
 _CLOUD_SCHEMA: Final = MessageSchema("foxglove.PointCloud", POINT_CLOUD)
 
 
@@ -84,6 +88,8 @@ def signal_schema(signal: Signal) -> MessageSchema:
     """Return the type of a signal's readings."""
     if signal.type in PICTURE_TYPES:
         return _IMAGE_SCHEMA
+    if signal.type == "video":
+        return _VIDEO_SCHEMA
     if signal.type == "point_cloud":
         return _CLOUD_SCHEMA
     about = " ".join(filter(None, (signal.title or signal.description, signal.unit)))
@@ -129,6 +135,10 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int, prefix: str = "
                 "format": _format(value),
             }
         )
+    if signal.type == "video" and isinstance(value, bytes):
+        unit = read_unit(value)
+        if unit is not None:
+            return _video_message(unit, sample, time_ns)
     if signal.type == "point_cloud" and isinstance(value, bytes):
         with suppress(BadValue):  # the file comes from another program
             fields = cloud_fields(value)
@@ -138,6 +148,19 @@ def sample_message(signal: Signal, sample: Sample, time_ns: int, prefix: str = "
     if sample.alarm:
         told["alarm"] = sample.alarm
     return as_json(told)
+
+
+def _video_message(unit: VideoUnit, sample: Sample, time_ns: int) -> bytes:
+    """Return an access unit as JSON text, with its time of arrival."""
+    late_s = sample.time_s - arrival_s(unit, sample.time_s)
+    return as_json(
+        {
+            "timestamp": stamp(max(0, time_ns - round(late_s * _SECOND_NS))),
+            "frame_id": sample.signal,
+            "data": unit.data,
+            "format": "h265" if unit.codec.startswith(_HEVC) else "h264",
+        }
+    )
 
 
 def link_message(status: LinkStatus) -> bytes:

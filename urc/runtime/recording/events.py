@@ -15,8 +15,9 @@ from urc.runtime.cloud_messages import cloud_file
 from urc.runtime.hub import LinkState, LinkStatus, LogEntry, Traffic
 from urc.runtime.json_messages import LEVELS
 from urc.runtime.recording.shapes import DRIVING, LINK, LOG, SIGNALS, WIRE
+from urc.runtime.recording.videos import RecordedVideos
 
-__all__ = ["event_of", "is_state", "topic_of"]
+__all__ = ["event_of", "is_loss", "is_state", "topic_of"]
 
 _MOST: Final = 2**31 - 1
 
@@ -26,13 +27,22 @@ def is_state(topic: str) -> bool:
     return topic.startswith((SIGNALS, LINK))
 
 
+def is_loss(note: LogEntry) -> bool:
+    """Return whether a log entry states that data is missing from the recording."""
+    return note.source == "recording" and note.level == "warning"
+
+
 def topic_of(signal: str) -> str:
     """Return a signal's topic."""
     return SIGNALS + signal
 
 
 def event_of(
-    topic: str, data: bytes, time_s: float, signals: Mapping[str, Signal]
+    topic: str,
+    data: bytes,
+    time_s: float,
+    signals: Mapping[str, Signal],
+    videos: RecordedVideos | None = None,
 ) -> Sample | LinkStatus | LogEntry | Traffic | None:
     """Return the event that a message describes; None if the message is not recognised.
 
@@ -41,22 +51,31 @@ def event_of(
         data: JSON text of the message.
         time_s: time of the event, in monotonic seconds.
         signals: signals of the displayed profile, which may differ from the recorded profile.
+        videos: videos of the playback; None if only keyframes of videos are needed.
     """
     try:
         told = msgspec.json.decode(data)
-        return _event(topic, told, time_s, signals) if isinstance(told, dict) else None
+        if not isinstance(told, dict):
+            return None
+        return _event(topic, told, time_s, signals, videos or RecordedVideos())
     except Exception:  # the message is damaged, or from another program
         return None
 
 
 def _event(
-    topic: str, told: dict[str, Any], time_s: float, signals: Mapping[str, Signal]
+    topic: str,
+    told: dict[str, Any],
+    time_s: float,
+    signals: Mapping[str, Signal],
+    videos: RecordedVideos,
 ) -> Sample | LinkStatus | LogEntry | Traffic | None:
     if topic.startswith(SIGNALS):
         signal = signals.get(topic.removeprefix(SIGNALS))
         alarm = told.get("alarm", "")
         if signal is None or alarm not in get_args(Alarm):
             return None
+        if signal.type == "video" and "data" in told:
+            return Sample(signal.name, videos.value(signal.name, told, time_s), time_s)
         return Sample(signal.name, _value(signal, told), time_s, cast("Alarm", alarm))
     if topic.startswith(LINK):
         if told["state"] not in get_args(LinkState):

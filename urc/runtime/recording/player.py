@@ -25,8 +25,9 @@ from urc.protocol.sequences.sequence_control import Pull
 from urc.runtime.clock import Clock, LoopClock, within
 from urc.runtime.held_commands import MotionBackend, MotionFrames
 from urc.runtime.hub import Hub, LinkStatus, LogEntry, Traffic
-from urc.runtime.recording.events import event_of, topic_of
+from urc.runtime.recording.events import event_of, is_loss, topic_of
 from urc.runtime.recording.reader import RecordedMessage, Recording
+from urc.runtime.recording.videos import RecordedVideos
 from urc.runtime.session import CommandFailed
 
 __all__ = ["FASTEST", "Player", "REFUSAL"]
@@ -81,6 +82,7 @@ class Player:
         self._number = 0
         """Number of jumps to another position so far."""
         self._changed = asyncio.Event()
+        self._videos = RecordedVideos()
 
     @property
     def began_s(self) -> float:
@@ -174,6 +176,7 @@ class Player:
                 hub.set_link(LinkStatus(name, "connecting", "", self._clock.now()))
             start_ns = self.recording.start_ns + round(self._base_s * 1e9)
             before = await asyncio.to_thread(self.recording.before, start_ns)
+            self._videos = RecordedVideos()
             self._publish(hub, before)
             self._forget(hub, {message.topic for message in before})
             stream = self.recording.messages(start_ns)
@@ -249,7 +252,8 @@ class Player:
         samples: list[Sample] = []
         for message in messages:
             age_s = max(0.0, (position_ns - message.time_ns) / 1e9) / self._speed
-            event = event_of(message.topic, message.data, now_s - age_s, hub.signals)
+            at_s, signals = now_s - age_s, hub.signals
+            event = event_of(message.topic, message.data, at_s, signals, self._videos)
             if isinstance(event, Sample):
                 samples.append(event)
                 continue
@@ -260,6 +264,8 @@ class Player:
                 case LinkStatus() if event.transport in self.profile.driver.transports:
                     hub.set_link(event)
                 case LogEntry():
+                    if is_loss(event):
+                        self._videos.lose()
                     hub.log(event)
                 case Traffic() if hub.traffic_watchers:
                     hub.saw(event)

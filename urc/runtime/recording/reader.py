@@ -18,6 +18,7 @@ from urc.problems import UrcError
 from urc.runtime.recording.events import is_state
 from urc.runtime.recording.recorder import check_installed
 from urc.runtime.recording.shapes import FILES, LOG, PROFILE
+from urc.runtime.recording.videos import Group, recorded_unit
 from urc.runtime.recording.widget_files import MOST_FILE_BYTES
 
 __all__ = ["RecordedMessage", "Recording", "open_recording"]
@@ -66,12 +67,22 @@ class Recording(NamedTuple):
         yield from _messages(self, from_ns, math.inf)
 
     def before(self, until_ns: int) -> list[RecordedMessage]:
-        """Return the last message of each signal and transport before a given time."""
+        """Return the last message of each signal and transport before a given time.
+
+        For a video, the result contains all messages from the last keyframe on.
+        """
         last: dict[str, RecordedMessage] = {}
+        videos: dict[str, Group[RecordedMessage]] = {}
         for message in _messages(self, 0, until_ns):
-            if is_state(message.topic):
+            if not is_state(message.topic):
+                continue
+            unit = recorded_unit(message.data)
+            if unit is None:
                 last[message.topic] = message
-        return sorted(last.values())
+            else:
+                videos.setdefault(message.topic, Group()).add(message, unit)
+        found = [*last.values(), *(one for group in videos.values() for one in group.items)]
+        return sorted(found, key=lambda one: one.time_ns)  # keeps the order of each video
 
 
 def open_recording(file: Path, *, has_profile: bool = False) -> Recording:

@@ -1,8 +1,8 @@
 """The contents of a recording: its topics, and events as JSON messages.
 
 Layer 4, pure. A recording is an MCAP file (https://mcap.dev/spec) of JSON messages. The file
-includes the JSON Schemas of its messages, so any MCAP program can display the messages. Images and
-the log use standard message types, ``foxglove.CompressedImage`` and ``foxglove.Log``: see
+includes the JSON Schemas of its messages, so any MCAP program can display the messages. Images,
+videos and the log use standard message types, such as ``foxglove.CompressedVideo``: see
 https://docs.foxglove.dev/docs/visualization/message-schemas/introduction.
 """
 
@@ -54,6 +54,8 @@ FILES: Final = "files/"
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
+_CAMERA: Final = "camera"
+"""Type of the transports whose data is not recorded as traffic: the signals contain all of it."""
 _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
 """Latest time that all MCAP programs can read, in nanoseconds since 1970."""
@@ -87,9 +89,10 @@ def channels(driver: Driver) -> tuple[McapChannel, ...]:
             types = {name: argument_property(one) for name, one in command.arguments.items()}
             shape = object_schema(f"urc.Command.{command.name}", types)
             found.append(_channel(COMMANDS + command.name, shape))
-    for name in driver.transports:
+    for name, spec in driver.transports.items():
         found.append(_channel(LINK + name, LINK_SCHEMA))
-        found.append(_channel(WIRE + name, object_schema("urc.Wire", _BYTES)))
+        if spec.type != _CAMERA:
+            found.append(_channel(WIRE + name, object_schema("urc.Wire", _BYTES)))
     found.append(_channel(LOG, LOG_SCHEMA))
     found.append(_channel(DRIVING, object_schema("urc.Driving", _ENTRY)))
     return tuple(found)
@@ -111,6 +114,7 @@ class RecordingEncoder:
         """
         self._signals = driver.signals
         self._commands = driver.commands
+        self._cameras = {name for name, one in driver.transports.items() if one.type == _CAMERA}
         self._utc_ns = utc_ns
         self._told_ns = 0
 
@@ -120,7 +124,7 @@ class RecordingEncoder:
             case Sample():
                 return [self._sample(event)]
             case Traffic():
-                return [self._traffic(event)]
+                return [] if event.transport in self._cameras else [self._traffic(event)]
             case MotionRecord():
                 return [self._moved(event.command, event.arguments, self._now(event.time_s))]
             case LinkStatus():

@@ -13,7 +13,7 @@ from urc.model.values import Sample
 from urc.motion.driving_lock import SentImages
 from urc.runtime.clock import Clock
 from urc.runtime.hub import Hub
-from urc.video import VideoUnit, read_unit
+from urc.video import VideoUnit, arrival_s, read_unit
 from urc.web.wire.picture import NUMBERS, as_frame, encode_video
 
 __all__ = ["GROUP_BYTES", "GROUP_UNITS", "VideoFeed", "VideoGroup", "VideoSubscription"]
@@ -24,9 +24,6 @@ GROUP_UNITS: Final = 1500
 SHARED_FOR_S: Final = 0.05
 """Maximum age at which an encoded unit is reused, in seconds, as for images."""
 _UNRECORDED: Final = SentImages()
-_LATE_S: Final = 60.0
-"""Longest credible time between arrival and reading of a unit, in seconds. A recording contains
-arrival times of another computer."""
 
 
 @dataclass(slots=True)
@@ -115,7 +112,7 @@ class VideoFeed:
                 unit = read_unit(sample.value)
                 if unit is None:
                     continue
-                self.overflows += group.add(unit, _arrival_s(unit, sample))
+                self.overflows += group.add(unit, arrival_s(unit, sample.time_s))
                 if self.heard is not None:
                     self.heard(sample.signal, sample.value, unit)
 
@@ -145,9 +142,3 @@ class VideoFeed:
             message = encode_video(index, kept.unit, kept.number, age_ms, round(now_s * 1000))
             kept.frame, kept.made_s = as_frame(message), now_s
         return kept.frame
-
-
-def _arrival_s(unit: VideoUnit, sample: Sample) -> float:
-    """Return when a unit reached this computer, also if the server was held up afterwards."""
-    late_s = sample.time_s - unit.time_s
-    return unit.time_s if 0 <= late_s <= _LATE_S else sample.time_s

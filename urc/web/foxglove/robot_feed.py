@@ -1,8 +1,8 @@
 """One client's subscriptions to one robot's topics, with the unsent messages.
 
-Layer 5. The unsent messages are limited to a few readings of each signal, the newest image and the
-newest state of each connection. If a client reads too slowly, older readings are dropped and
-counted. A slow client does not affect other clients.
+Layer 5. The unsent messages are limited: a few readings of each signal, the newest image and the
+newest state of each connection. Of a video, a few seconds are kept. If a client reads too slowly,
+older readings are dropped and counted. A slow client does not affect other clients.
 """
 
 from collections import deque
@@ -13,6 +13,7 @@ from typing import Final
 from urc.model.values import BINARY_TYPES, Sample, Signal
 from urc.runtime.hub import Hub, LinkStatus
 from urc.web.foxglove.topics import LOG_SOURCE, HubMessages, TopicMessage, TopicSource
+from urc.web.foxglove.video_queue import add_unit
 from urc.wire.foxglove import encode_message_head
 
 __all__ = ["FIRST_NOTES", "MOST_WAITING", "RobotFeed"]
@@ -38,6 +39,10 @@ class RobotFeed:
         """The client's subscription ids, keyed by the source of the messages."""
         self._waiting: dict[TopicSource, deque[Sample | TopicMessage]] = {}
         """Unsent readings and messages, keyed by subscribed signal or slot."""
+        self._videos: dict[TopicSource, deque[Sample]] = {}
+        """Unsent access units, keyed by subscribed video."""
+        self._need_key: set[TopicSource] = set()
+        """Videos of which the client needs a keyframe next."""
         self._sources: dict[str, list[TopicSource]] = {}
         """Subscribed signals and slots, keyed by the signal that changes them."""
         self._ready: dict[TopicSource, None] = {}
@@ -71,7 +76,10 @@ class RobotFeed:
             signal: the signal's declaration; None unless the source is a signal.
         """
         self._ids[source] = subscription
-        if source.kind in _QUEUED:
+        if source.kind == "signal" and signal is not None and signal.type == "video":
+            self._videos[source] = deque()
+            self._need_key.add(source)
+        elif source.kind in _QUEUED:
             is_large = signal is not None and signal.type in BINARY_TYPES
             self._waiting[source] = deque(maxlen=1 if is_large else MOST_WAITING)
         if self._hub is not None:
@@ -83,6 +91,8 @@ class RobotFeed:
         self._ids.pop(source, None)
         self._ready.pop(source, None)
         self._waiting.pop(source, None)
+        self._videos.pop(source, None)
+        self._need_key.discard(source)
         if source.kind == "link":
             self._seen_links.pop(source.name, None)
         self._sort()
@@ -110,6 +120,9 @@ class RobotFeed:
             self._ready.clear()
             for waiting in self._waiting.values():
                 waiting.clear()
+            for units in self._videos.values():
+                units.clear()
+            self._need_key.update(self._videos)
 
     def next_message(self) -> bytes | None:
         """Remove and return the next binary message; None if no message is ready."""
@@ -126,7 +139,7 @@ class RobotFeed:
     def _sort(self) -> None:
         """Map each signal to the subscribed signals and slots that it changes."""
         self._sources = {}
-        for source in self._waiting:
+        for source in (*self._waiting, *self._videos):
             names = {source.name}
             if source.kind == "place":
                 names = set(self._messages.signals_of(source.name) if self._messages else ())
@@ -145,12 +158,25 @@ class RobotFeed:
         places: dict[TopicSource, None] = {}
         for sample in samples:
             for source in self._sources.get(sample.signal, ()):
-                if source.kind in _OF_SIGNALS:
+                if source in self._videos:
+                    self._push_unit(source, sample)
+                elif source.kind in _OF_SIGNALS:
                     self._push(source, sample)
                 else:
                     places[source] = None
         for source in places:
             self._push_place(source)
+
+    def _push_unit(self, source: TopicSource, sample: Sample) -> None:
+        """Queue an access unit of a video; drop whole groups of pictures if the client is slow."""
+        waiting = self._videos[source]
+        dropped, needs_key = add_unit(waiting, sample, needs_key=source in self._need_key)
+        self._dropped += dropped
+        (self._need_key.add if needs_key else self._need_key.discard)(source)
+        if waiting:
+            self._mark(source)
+        else:
+            self._ready.pop(source, None)
 
     def _push(self, source: TopicSource, item: Sample | TopicMessage) -> None:
         waiting = self._waiting[source]
@@ -184,6 +210,8 @@ class RobotFeed:
                 self._mark(source)
 
     def _begin(self, source: TopicSource, hub: Hub) -> None:
+        if source in self._videos:
+            return  # the first message is the next keyframe
         if source.kind in _OF_SIGNALS:
             newest = hub.latest(source.name)
             if newest is not None:
@@ -207,6 +235,12 @@ class RobotFeed:
         hub, messages = self._hub, self._messages
         if hub is None or messages is None:
             return None
+        if source in self._videos:
+            units = self._videos[source]
+            sample = units.popleft()
+            if units:
+                self._ready[source] = None
+            return messages.of_sample(sample)
         if source.kind in _QUEUED:
             waiting = self._waiting[source]
             item = waiting.popleft()

@@ -7,6 +7,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from tests.unit.test_video import baseline_sps
 from urc.model.driver import Argument, Command, Driver, FramingSpec, Hold, TransportSpec
 from urc.model.values import Reading, Sample, Signal
 from urc.protocol.values.occupancy_grid import Grid, encode_grid
@@ -33,6 +34,7 @@ CLOUDS = [
     for colour, size in (("intensity", 16), ("rgb", 16), ("", 12))
 ]
 PNG = b"\x89PNG\r\n\x1a\n rest"
+UNIT = VideoUnit("avc1.42001E", True, 64, 48, 1.5, baseline_sps(64, 48) + b"\0\0\1\x65\x88")
 SIGNALS = {
     one.name: one
     for one in (
@@ -85,6 +87,16 @@ FOXGLOVE: Mapping[str, Any] = {
         },
         "required": ["timestamp", "frame_id", "data", "format"],
     },
+    "foxglove.CompressedVideo": {
+        "type": "object",
+        "properties": {
+            "timestamp": TIME,
+            "frame_id": {"type": "string"},
+            "data": {"type": "string", "contentEncoding": "base64"},
+            "format": {"type": "string"},
+        },
+        "required": ["timestamp", "frame_id", "data", "format"],
+    },
     "foxglove.Log": {
         "type": "object",
         "properties": {
@@ -122,7 +134,7 @@ EVENTS: Mapping[str, Tapped] = {
     "coloured points": Sample("cloud", CLOUDS[1], 1.5),
     "plain points": Sample("cloud", CLOUDS[2], 1.5),
     "bytes": Sample("dump", b"\x00\xff", 1.5),
-    "video": Sample("film", encode_unit(VideoUnit("avc1.42", True, 4, 4, 1.5, b"\0")), 1.5),
+    "video": Sample("film", encode_unit(UNIT), 1.5),
     "line": LinkStatus(
         "wire", "silent", "tcp 127.0.0.1:6789", 1.5, "no answer", 2, 3, is_ready=True
     ),
@@ -165,6 +177,7 @@ def test_images_and_the_log_have_the_names_that_programs_know() -> None:
     names = {channel.topic: channel.shape for channel in channels(DRIVER)}
     assert names["/signals/camera"] == "foxglove.CompressedImage"
     assert names["/signals/floor"] == "foxglove.CompressedImage"
+    assert names["/signals/film"] == "foxglove.CompressedVideo"
     assert json.loads(told(EVENTS["map"])[2])["format"] == "png"
     assert names["/signals/cloud"] == "foxglove.PointCloud"
     assert names[LOG] == "foxglove.Log"
