@@ -30,6 +30,7 @@ NEEDING = {
     "send": "there is no such file",
     "trust": "there is no such file",
     "replay": "puppet.mcap cannot be read",
+    "export": "rover.mcap cannot be read",
     "restore": "urc-backup.zip: No such file",
     "publish": "token.txt: No such file",
     "watch": "nothing listens on",

@@ -18,6 +18,7 @@ VERBS: dict[str, str] = {
     "send": "run one command of a robot and print the reply",
     "record": "record a session to a file, until Ctrl-C",
     "replay": "replay a recording in the dashboard",
+    "export": "write a video of a recording to an MP4 file",
     "new": "create the files of a new widget",
     "repo": "manage package repositories, upload tokens and keys",
     "install": "install a package and its dependencies, after showing the permissions",
@@ -42,7 +43,7 @@ VERBS: dict[str, str] = {
 }
 
 GROUPS: dict[str, tuple[str, ...]] = {
-    "drive": ("demo", "serve", "watch", "send", "record", "replay", "trust", "discover"),
+    "drive": ("demo", "serve", "watch", "send", "record", "replay", "export", "trust", "discover"),
     "write and check documents": (
         *("validate", "explain", "simulate", "docs", "resolve", "migrate", "new", "schema"),
     ),
