@@ -52,7 +52,7 @@ PIECE_S: Final = 20
 """Time of one trial of jitter, in seconds."""
 ROUND: Final = 20
 """Number of trials with the same server."""
-ROUND_OF_VIDEOS: Final = 6
+ROUND_OF_VIDEOS: Final = {"video": 6, "standing": 3}
 """Number of trials with the same cart, whose server ends after `WAIT_S` seconds."""
 MOST_TIMES: Final = 3
 """Maximum number of trials, as a multiple of the required number, if trials are invalid."""
@@ -71,7 +71,6 @@ BOUNDS_MS: Final = {
     "standing": BOUND_MS + 1000 * KEYFRAMES * GROUP / RATE,
 }
 """Longest permitted time from the declared age until the stop, in milliseconds."""
-OF_VIDEOS: Final = ("video", "standing")
 JITTER: Final = "jitter"
 
 
@@ -153,7 +152,7 @@ def measured(each: int, jitter_s: int) -> list[Result]:
             made = len(_all(kept.rows, kind))
             if made >= MOST_TIMES * count:
                 break  # the machine is too busy
-            most = ROUND_OF_VIDEOS if kind in OF_VIDEOS else ROUND
+            most = ROUND_OF_VIDEOS.get(kind, ROUND)
             asyncio.run(_round(kind, min(most, left), kept, seed=made))
     rows = kept.end()
     results = [_told(kind, _all(rows, kind), each) for kind in KINDS]

@@ -21,7 +21,7 @@ class Projector:
     def __init__(self, port: int, kind: FilmKind = "moving") -> None:
         """Send to a port of loopback."""
         self.kind: FilmKind = kind
-        """What the camera sees from the next image on."""
+        """What the camera sees from the next image on; ``standing`` repeats the last image."""
         self._port = port
         self._is_over = threading.Event()
         self._thread = threading.Thread(target=self._run, name="projector", daemon=True)
@@ -40,8 +40,11 @@ class Projector:
             stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
             stream.codec_context.gop_size = GROUP
             began_s = time.monotonic()
+            image = film_image(0, self.kind)
             for place in count():
-                frame = av.VideoFrame.from_ndarray(film_image(place, self.kind), "rgb24")
+                if self.kind != "standing":
+                    image = film_image(place, self.kind)
+                frame = av.VideoFrame.from_ndarray(image, "rgb24")
                 frame.pts = place
                 for packet in stream.encode(frame):
                     target.mux(packet)
