@@ -201,10 +201,11 @@ async def _serve(
 
 
 def _warn_of_packages(robot: Robot) -> None:
-    """Report a robot that no page can open, because an extra is not installed."""
+    """Report a robot that no page can open, or without video, because of a missing extra."""
     transports = built_in_catalog().transports
-    for text in missing_packages(robot.profile, robot.settings, transports):
-        complain(f"urc: {robot.profile.name} cannot be opened: {text}")
+    missing = missing_packages(robot.profile, robot.settings, transports)
+    for text in missing.of(robot.profile.name, "cannot be opened"):
+        complain(f"urc: {text}")
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:

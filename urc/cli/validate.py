@@ -161,8 +161,8 @@ def _note_missing_packages(path: str, profile: "Profile", report: _Report) -> No
     from urc.runtime.missing_packages import missing_packages
     from urc.runtime.registries import built_in_catalog
 
-    for text in missing_packages(profile, {}, built_in_catalog().transports):
-        report.notes.append(f"{path} cannot be opened on this computer: {text}")
+    missing = missing_packages(profile, {}, built_in_catalog().transports)
+    report.notes += missing.of(path, "cannot be opened on this computer")
 
 
 def _examine_folder(

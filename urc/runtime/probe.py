@@ -15,7 +15,7 @@ from urc.registry import Table
 from urc.runtime.connection_cause import Cause, advice_on, cause_of
 from urc.runtime.hub import LinkStatus
 from urc.runtime.session import Session
-from urc.runtime.transport_chain import make_lines
+from urc.runtime.transport_chain import make_lines, without
 from urc.transports.base import TransportError
 
 __all__ = ["LONGEST_S", "ProbeResult", "Verdict", "probe"]
@@ -68,7 +68,8 @@ async def probe(
         UrcError: the session cannot be built with these settings.
     """
     async with opened() as session:
-        specs = session.profile.driver.transports
+        declared, absent = session.profile.driver.transports, session.absent
+        specs = {name: spec for name, spec in declared.items() if name not in absent}
         loop = asyncio.get_running_loop()
         longest = max((one.timeouts.connect_s for one in specs.values()), default=0.0) + _ANSWER_S
         began_s = loop.time()
@@ -92,7 +93,9 @@ async def probe(
         found = dict(session.hub.links)
         idle = [name for name, one in found.items() if one.state == "idle" and not one.attempts]
         lone = await _opened_alone(session, idle, table)
-    return [lone.get(name) or _told(spec, found.get(name)) for name, spec in specs.items()]
+    tried = {name: lone.get(name) or _told(spec, found.get(name)) for name, spec in specs.items()}
+    tried |= {name: _failed(declared[name], "", str(fault)) for name, fault in absent.items()}
+    return [tried[name] for name in declared]
 
 
 def _is_connected(status: LinkStatus) -> bool:
@@ -124,7 +127,7 @@ async def _opened_alone(session: Session, names: list[str], table: Table) -> dic
     tried: dict[str, ProbeResult] = {}
     if not names:
         return tried
-    made = make_lines(driver, session.settings, table)
+    made = make_lines(without(driver, session.absent), session.settings, table)
     for name in names:
         spec, transport = driver.transports[name], made[name].transport
         if spec.tunnel:

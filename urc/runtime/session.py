@@ -28,13 +28,13 @@ from urc.runtime.command_failed import CommandFailed
 from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.grid_encoder import GridEncoder
 from urc.runtime.held_commands import is_lossy
-from urc.runtime.hub import Hub
+from urc.runtime.hub import TRANSPORT, Hub, LogEntry
 from urc.runtime.image_demand import ImageDemand, pausable_topics
 from urc.runtime.link import Link
 from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
 from urc.runtime.settings import resolve_settings
-from urc.runtime.transport_chain import UNGUARDED, make_transports
+from urc.runtime.transport_chain import UNGUARDED, absent_cameras, make_transports, without
 from urc.transports.base import GoalRecord, SupportsGoals, Transport
 
 if TYPE_CHECKING:
@@ -121,6 +121,8 @@ class Session:
         self.profile = profile
         self.settings = dict(settings)
         driver = profile.driver
+        self.absent = absent_cameras(driver, self.settings, transports)
+        """Cameras without a link, because their package is not installed, each with the reason."""
         self._redactor = Redactor.of(profile, self.settings)
         specs = driver.transports.items()
         streams = (name for name, spec in specs if spec.framing.type != "datagram")
@@ -156,7 +158,7 @@ class Session:
     def _make_backend(
         self, engine: Engine, transports: Table, motion: Motion
     ) -> "GuardClient | None":
-        driver = self.profile.driver
+        driver = without(self.profile.driver, self.absent)
         if motion == "none" or all(one.hold is None for one in driver.commands.values()):
             return None
         from urc.runtime.guarding import start_guard_client  # takes 20 ms, so only with motion
@@ -176,7 +178,7 @@ class Session:
         return GridEncoder(self.hub.publish)
 
     def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
-        driver = self.profile.driver
+        driver = without(self.profile.driver, self.absent)
         transports: Mapping[str, Transport]
         self._goals = GoalReports(())  # used without a backend
         if self.backend is not None:
@@ -221,6 +223,9 @@ class Session:
 
     async def __aenter__(self) -> "Session":
         await self._group.__aenter__()
+        for name, fault in self.absent.items():
+            entry = LogEntry(self._clock.now(), "warning", f"{TRANSPORT}{name}", str(fault))
+            self.hub.log(entry)
         if self.backend is not None:
             self.backend.start()
         self._tasks = [self._group.create_task(link.run()) for link in self._links.values()]

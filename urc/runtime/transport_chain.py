@@ -1,16 +1,31 @@
 """A driver's transports, ordered so that each tunnel precedes the transports that it carries."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Final, NamedTuple, cast
 
 from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
+from urc.problems import UrcError
 from urc.protocol.forms.topics import listened, packed_topics
 from urc.registry import Table
 from urc.runtime.settings import options_of
-from urc.transports.base import TopicSubscription, Transport, TransportSetup, Tunnel
+from urc.transports.base import (
+    MissingPackage,
+    TopicSubscription,
+    Transport,
+    TransportSetup,
+    Tunnel,
+)
 
-__all__ = ["UNGUARDED", "BuiltTransport", "make_lines", "make_transports"]
+__all__ = [
+    "UNGUARDED",
+    "BuiltTransport",
+    "absent_cameras",
+    "alone",
+    "make_lines",
+    "make_transports",
+    "without",
+]
 
 UNGUARDED: Final = frozenset(("camera",))
 """Transport types that stay in the server's process, because they accept no data and move nothing.
@@ -110,3 +125,49 @@ def make_transports(
         for name, made in lines.items()
         if only is None or made.spec.type in only
     }
+
+
+def absent_cameras(
+    driver: Driver, settings: Mapping[str, Value], table: Table
+) -> dict[str, MissingPackage]:
+    """Return the cameras whose package is not installed, each with the reason.
+
+    Cameras accept no data and move nothing, so the robot's other transports work without them. For
+    a robot whose transports are all cameras, the result is empty: without its package, such a robot
+    cannot be opened.
+
+    Args:
+        driver: the loaded driver.
+        settings: a value for every setting.
+        table: table of the available transport types.
+    """
+    cameras = [name for name, spec in driver.transports.items() if spec.type in UNGUARDED]
+    found: dict[str, MissingPackage] = {}
+    if len(cameras) == len(driver.transports):
+        return found
+    for name in cameras:
+        try:
+            make_transports(alone(driver, name), settings, table)
+        except MissingPackage as fault:
+            found[name] = fault
+        except UrcError:
+            continue  # reported when all transports are built
+    return found
+
+
+def without(driver: Driver, names: Collection[str]) -> Driver:
+    """Return the driver without the transports `names`, which carry no other transport."""
+    kept = {name: spec for name, spec in driver.transports.items() if name not in names}
+    return driver._replace(transports=kept)
+
+
+def alone(driver: Driver, name: str) -> Driver:
+    """Return the driver with one transport and its tunnels.
+
+    The loader has checked that tunnels are not circular.
+    """
+    kept = {}
+    while name:
+        kept[name] = driver.transports[name]
+        name = kept[name].tunnel
+    return driver._replace(transports=kept)

@@ -88,7 +88,7 @@ def test_a_missing_value_hides_no_missing_package(
     """The value is entered later, on a page of the robot; the package is needed now."""
     one = robot(tmp_path, "serial", "port", '""', "")
     transports = built_in_catalog().transports
-    assert missing_packages(one.profile, {}, transports) == ()
+    assert missing_packages(one.profile, {}, transports) == ((), ())
     remove(monkeypatch, "serial")
     empty = one.profile._replace(
         settings={
@@ -96,7 +96,7 @@ def test_a_missing_value_hides_no_missing_package(
             for name, setting in one.profile.settings.items()
         }
     )
-    (text,) = missing_packages(empty, {}, transports)
+    (text,) = missing_packages(empty, {}, transports).needed
     assert text.startswith("serial needs the package serialx: ")
 
 
@@ -128,10 +128,11 @@ def test_every_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.Monk
     file.write_text(SEVERAL, "utf-8")
     profile = load_profile(str(file), built_in_catalog())
     transports = built_in_catalog().transports
-    assert missing_packages(profile, {}, transports) == ()
+    assert missing_packages(profile, {}, transports) == ((), ())
     for module in (mqtt, ros_zenoh, rosbridge):
         monkeypatch.setattr(module, "find_spec", lambda _: None)
-    named = [text.partition(":")[0] for text in missing_packages(profile, {}, transports)]
+    missing = missing_packages(profile, {}, transports)
+    named = [text.partition(":")[0] for text in missing.needed]
     assert named == [
         "mqtt needs the package paho-mqtt",
         "cbor needs the package cbor2",
