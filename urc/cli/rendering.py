@@ -1,7 +1,7 @@
-"""The warning about emulated robots whose cameras and laser scanners do not work.
+"""The warnings about emulated robots whose cameras and laser scanners do not work.
 
-Layer 6. Simulated cameras and laser scanners require a separate extra, because real robots do not
-need the extra; see docs/decisions/0045.
+Layer 6. Simulated cameras and laser scanners require separate extras, because most real robots do
+not need the extras; see docs/decisions/0045 and 0073.
 """
 
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ from urc.cli.output import complain
 from urc.model.profile import Profile
 from urc.simulator.simulated_body import has_rendering, rendered_signals
 
-__all__ = ["warn_without_rendering"]
+__all__ = ["warn_without_encoder", "warn_without_rendering"]
 
 
 def warn_without_rendering(profiles: Iterable[Profile]) -> None:
@@ -24,3 +24,15 @@ def warn_without_rendering(profiles: Iterable[Profile]) -> None:
             f"urc: the cameras and laser scanners of {', '.join(blind)} require numpy and Pillow;"
             f" to install both: {install_command('demo')}"
         )
+
+
+def warn_without_encoder(profile: Profile) -> None:
+    """Report an emulated robot whose cameras send no video on this machine."""
+    from urc.simulator.servers.camera import has_encoder  # only for emulated robots
+
+    if has_encoder() or all(one.type != "camera" for one in profile.driver.transports.values()):
+        return
+    complain(
+        f"urc: the emulated {profile.name} sends no video, which requires av; to install it:"
+        f" {install_command('video')}"
+    )

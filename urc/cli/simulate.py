@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Emulate the robot until Ctrl-C or SIGTERM."""
     from urc.cli.event_loop import run_loop
-    from urc.cli.rendering import warn_without_rendering
+    from urc.cli.rendering import warn_without_encoder, warn_without_rendering
     from urc.cli.settings import settings_given
     from urc.runtime.document_tests import sample_settings
     from urc.simulator.emulated_robot import EmulatedRobot
@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     settings = sample_settings(profile.settings) | values
     settings |= {name: 0 for name in missing if profile.settings[name].type == "port"}
     warn_without_rendering([profile])
+    warn_without_encoder(profile)
     emulated_robot, faulty = EmulatedRobot(profile, settings), FaultInjector()
     with faulty.watch(profile.name, emulated_robot):
         faulty.begin(arguments.faults)

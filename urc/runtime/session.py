@@ -124,9 +124,7 @@ class Session:
         self.absent = absent_cameras(driver, self.settings, transports)
         """Cameras without a link, because their package is not installed, each with the reason."""
         self._redactor = Redactor.of(profile, self.settings)
-        specs = driver.transports.items()
-        streams = (name for name, spec in specs if spec.framing.type != "datagram")
-        self.hub = Hub(driver.signals, self._redactor, streams)
+        self.hub = Hub(driver.signals, self._redactor, _streams(driver))
         self._clock: Clock = clock or LoopClock()
         fresh = TimeAndNonce(time.time, secrets.token_bytes)
         engine = Engine(driver, self.settings, fresh=fresh, is_compiled=True)
@@ -404,6 +402,11 @@ class Session:
                 await turnstile.wait()
         if turnstile.is_open:
             self._untried.pop(line, None)
+
+
+def _streams(driver: Driver) -> list[str]:
+    """Return the transports that may split one message into several pieces."""
+    return [name for name, one in driver.transports.items() if one.framing.type != "datagram"]
 
 
 def _limit_s(driver: Driver, name: str) -> float:

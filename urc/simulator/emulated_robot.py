@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Final, Protocol
 
-from urc.expressions import Template
+from urc.expressions import ExpressionError, Template
 from urc.model.driver import Driver, Message, TransportSpec
 from urc.model.payload import Payload
 from urc.model.profile import Profile, SimulatorRule
@@ -83,6 +83,7 @@ class EmulatedRobot:
             profile.driver, settings, profile.emulated, profile.world, is_plain=is_plain
         )
         self._pictures = _pictures(profile.driver, settings, self._values.senses)
+        self._videos = _videos(profile.driver)
         self._robot = DefaultResponder(profile.driver, settings, self._values)
         self._setters = TimedSetters()
         self._framings = {
@@ -116,6 +117,27 @@ class EmulatedRobot:
                     b"" if faults.is_silent or faults.drops((name,)) else body.picture(name, now_s)
                 )
         return None
+
+    def video(self, transport: str, now_s: float) -> bytes | None:
+        """Return the current image of a camera transport's video, as JPEG or PNG.
+
+        Return None while the robot sends no video, and b"" if the world does not determine the
+        image.
+
+        Args:
+            transport: name of a transport of type ``camera``.
+            now_s: current time, in seconds since the epoch.
+        """
+        body, faults = self._values.body, self._values.faults
+        name = self._videos.get(transport)
+        if name is None or faults.is_silent or faults.drops((name,)):
+            return None
+        if body is None or name not in self._values.senses:
+            return b""
+        try:
+            return body.picture(name, now_s) or None
+        except ExpressionError:
+            return None  # the condition of the video has no value yet
 
     @property
     def body(self) -> SimulatedBody | None:
@@ -154,7 +176,8 @@ class EmulatedRobot:
         `now_s` is the current time, in seconds since the epoch.
         """
         body = self._values.body
-        name = next(iter(self._pictures.values()), None)
+        names = (*self._pictures.values(), *self._videos.values())
+        name = next((one for one in names if one in self._values.senses), None)
         if body is None or name is None or self._values.faults.drops((name,)):
             return None
         return body.picture(name, now_s)
@@ -197,6 +220,16 @@ def _pictures(
         if message.read.topic is not None
         and name in senses
         and driver.signals[name].type == "image"
+    }
+
+
+def _videos(driver: Driver) -> Mapping[str, str]:
+    """Return the signal with the video of each camera transport, keyed by transport."""
+    return {
+        message.transport: name
+        for message in driver.messages.values()
+        for name in message.read.fields
+        if driver.transports[message.transport].type == "camera"
     }
 
 

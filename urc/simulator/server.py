@@ -73,8 +73,7 @@ async def serve(
                 name=name,
                 spec=spec,
                 options=_options_of(spec, settings),
-                # Only the robot itself connects to a transport behind another transport.
-                host=_LOOPBACK if spec.tunnel else host,
+                host=_LOOPBACK if spec.tunnel else host,  # only the robot connects through tunnels
                 line=lambda name=name: robot.line(name),  # type: ignore[misc] # of this turn
                 now=now,
                 topics=listened(profile.driver, name, settings),
@@ -82,6 +81,7 @@ async def serve(
                 actions=actions_of(profile.driver, name, settings),
                 is_anywhere=is_anywhere or bool(spec.tunnel),
                 picture=lambda topics, name=name: robot.picture(name, topics, now()),  # type: ignore[misc] # of this turn
+                video=lambda name=name: robot.video(name, now()),  # type: ignore[misc] # of this turn
                 last_peer=last_peer,
                 carried=inside[name],
             )

@@ -21,6 +21,7 @@ from urc.protocol.values.point_cloud import encode_cloud, packed_cloud
 from urc.simulator.faults import Faults
 from urc.simulator.simulated_body import SimulatedBody, has_rendering, rendered_signals
 from urc.simulator.world.world import PLAIN
+from urc.video import VideoUnit, encode_unit
 
 __all__ = ["Names", "Unsettable", "Values"]
 
@@ -58,6 +59,19 @@ _POINTS: Final = encode_cloud(packed_cloud("", "", 2, {"x": [1.0, 1.0], "y": [0.
 """A point cloud of two points in front of the robot."""
 
 
+_FILM: Final = encode_unit(
+    VideoUnit(
+        "avc1.42C00A",
+        is_key=True,
+        width=16,
+        height=16,
+        time_s=0.0,
+        data=a2b_base64("AAAAAWdCwAraehAAAAMAEAAAAwPI8SJqAAAAAWjOD8gAAAABZYiEOieA"),
+    )
+)
+"""An access unit of a grey image. Only `urc.simulator.servers.camera` sends the world's images."""
+
+
 def plausible(signal: Signal, now_s: float) -> Reading:
     """Return a value for `signal` at `now_s` that is within all limits."""
     if signal.type in ("image", "blob"):
@@ -66,6 +80,8 @@ def plausible(signal: Signal, now_s: float) -> Reading:
         return _ROOM
     if signal.type == "point_cloud":
         return _POINTS
+    if signal.type == "video":
+        return _FILM
     if signal.type == "transform_tree":
         return _TREE
     if signal.type == "object":
@@ -261,7 +277,7 @@ def _sensed(body: SimulatedBody, signal: Signal, now_s: float) -> Reading:
     try:
         value = body.sense(signal.name, now_s)
         if isinstance(value, bytes):
-            return value
+            return _FILM if signal.type == "video" else value
         if isinstance(value, float):
             value = round(value, _DIGITS)
         return None if value is None else _kept(signal, _within(signal, value))

@@ -76,6 +76,9 @@ class ServerContext(NamedTuple):
     picture: Callable[[Sequence[str]], bytes | None] = lambda _: None
     """Function that returns the current world image for the given topic names; None if there is no
     image."""
+    video: Callable[[], bytes | None] = lambda: None
+    """Function that returns the current image of a camera transport's video. The result is b"" if
+    the robot has no world, and None while the robot sends no video."""
     last_peer: LastPeer | None = None
     """Host that last sent data, shared by all of the robot's servers; None means that the host is
     not recorded."""
@@ -116,6 +119,7 @@ SERVERS = Table(
         "ros": "urc.simulator.servers.rosbridge:RosbridgeServer",
         "mqtt": "urc.simulator.servers.mqtt:MqttRobot",
         "zenoh": "urc.simulator.servers.zenoh:ZenohRobot",
+        "camera": "urc.simulator.servers.camera:CameraServer",
     },
 )
 """Class of simulated server for each type of transport. Each class implements `SimulatedServer` and

@@ -76,6 +76,8 @@ class UrlServer(ListeningServer):
 
     SCHEME: ClassVar[str]
     """URL scheme without TLS."""
+    URL_PORT: ClassVar[int] = 80
+    """Port of a URL without a port."""
     _path = "/"
 
     def _port(self) -> int:
@@ -84,7 +86,7 @@ class UrlServer(ListeningServer):
         url = str(context.options.get("url"))
         try:
             parts = urlsplit(url)
-            port = 80 if parts.port is None else parts.port
+            port = self.URL_PORT if parts.port is None else parts.port
         except ValueError as fault:
             message = f"transports.{context.name}.url: {url!r} is not a URL to listen on"
             raise UrcError(message) from fault

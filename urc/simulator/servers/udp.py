@@ -20,7 +20,7 @@ from urc.simulator.servers.base import (
 )
 from urc.simulator.servers.clients import ClientConnection, Clients, converse
 
-__all__ = ["UdpServer"]
+__all__ = ["UdpServer", "free_port", "reachable"]
 
 FORGOTTEN_S = 300.0
 """Timeout for silent clients, in seconds; the timeout does not apply to the port on which the
@@ -58,11 +58,9 @@ class UdpServer(asyncio.DatagramProtocol):
             options["port"] = port
         text = f"udp {host_and_port(host, port)}"
         if context.options.get("listen") is not None:
-            own = (
-                _free_port(context.host) if context.is_anywhere else option_port(context, "listen")
-            )
+            own = free_port(context.host) if context.is_anywhere else option_port(context, "listen")
             options["listen"] = own
-            self._told = (_reachable(context.host), own)
+            self._told = (reachable(context.host), own)
             text += f", talks to {host_and_port(*self._told)}"
             self._meet(self._told)
         return Endpoint(host, port, text, options)
@@ -118,14 +116,14 @@ class UdpServer(asyncio.DatagramProtocol):
         return last_peer.host, address[1]
 
 
-def _reachable(host: str) -> str:
+def reachable(host: str) -> str:
     """Return `host`, or the loopback address if `host` means all addresses."""
     if host in ("0.0.0.0", ""):  # noqa: S104 - compared, not bound
         return "127.0.0.1"
     return "::1" if host == "::" else host
 
 
-def _free_port(host: str) -> int:
+def free_port(host: str) -> int:
     """Return a free UDP port on which the driver can listen."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -1,0 +1,113 @@
+"""The simulator's end of the process that encodes the images of an emulated camera."""
+
+import asyncio
+import subprocess
+import sys
+from contextlib import suppress
+from typing import Any, Final, NamedTuple
+
+from urc.problems import UrcError
+from urc.simulator.servers.video_process import FAULT, KEYFRAME, ORDER, RECORD
+
+__all__ = ["EncodedUnit", "EncoderFault", "VideoEncoder"]
+
+FIRST_S: Final = 20.0
+"""Maximum time for the first image, in seconds; the library loads slowly on small computers."""
+_IMAGE_S: Final = 5.0
+_END_S: Final = 1.0
+_MAX_UNIT_BYTES: Final = 8_388_608
+
+
+class EncoderFault(UrcError):
+    """Raised if the process cannot encode an image; the message is for people."""
+
+
+class EncodedUnit(NamedTuple):
+    """One access unit."""
+
+    is_key: bool
+    """Whether decoding can start with this image."""
+    data: bytes
+    """The access unit with start codes; a keyframe contains its parameter sets."""
+
+
+class VideoEncoder:
+    """An encoder in a process of its own, which starts with the first image."""
+
+    def __init__(self) -> None:
+        self._process: asyncio.subprocess.Process | None = None
+        self._limit_s = FIRST_S
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process has started."""
+        return self._process is not None
+
+    async def encode(self, image: bytes, *, is_key: bool = False) -> EncodedUnit:
+        """Return an image as an access unit.
+
+        Args:
+            image: JPEG or PNG.
+            is_key: whether the image must become a keyframe.
+
+        Raises:
+            EncoderFault: the process failed. The next call starts a new one.
+        """
+        try:
+            async with asyncio.timeout(self._limit_s):
+                process = self._process or await self._started()
+                head, content = await _exchanged(process, image, is_key=is_key)
+        except (TimeoutError, OSError, asyncio.IncompleteReadError) as fault:
+            await self.close()
+            raise EncoderFault("the process that encodes the video has failed") from fault
+        except asyncio.CancelledError:
+            await self.close()  # the answer to this image would be taken for the next one's
+            raise
+        if head == FAULT:
+            await self.close()
+            raise EncoderFault(f"the video cannot be encoded ({content.decode(errors='replace')})")
+        self._limit_s = _IMAGE_S
+        return EncodedUnit(head == KEYFRAME, content)
+
+    async def close(self) -> None:
+        """End the process; the method may be called twice."""
+        process, self._process = self._process, None
+        self._limit_s = FIRST_S
+        if process is None:
+            return
+        with suppress(ProcessLookupError):
+            process.kill()
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_END_S):
+                await process.wait()
+        if process.stdin is not None:
+            process.stdin.close()
+
+    async def _started(self) -> asyncio.subprocess.Process:
+        # -P: nothing is imported from the current folder. Ctrl-C is meant for the simulator.
+        command = [sys.executable, "-P", "-m", "urc.simulator.servers.video_process"]
+        more: dict[str, Any] = {"start_new_session": True}
+        if sys.platform == "win32":
+            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+        self._process = await asyncio.create_subprocess_exec(
+            *command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            **more,
+        )
+        return self._process
+
+
+async def _exchanged(
+    process: asyncio.subprocess.Process, image: bytes, *, is_key: bool
+) -> tuple[bytes, bytes]:
+    """Send an image to the process; return the kind and the content of its answer."""
+    if process.stdin is None or process.stdout is None:
+        raise OSError("the process has no pipes")
+    process.stdin.write(ORDER.pack(len(image), is_key) + image)
+    await process.stdin.drain()
+    size, kind = RECORD.unpack(await process.stdout.readexactly(RECORD.size))
+    if size > _MAX_UNIT_BYTES:
+        raise OSError("the process sent an invalid record")
+    return kind, await process.stdout.readexactly(size)

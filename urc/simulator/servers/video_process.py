@@ -1,0 +1,163 @@
+"""The process that encodes the images of one emulated camera as H.264, without delaying the robot.
+
+``python -m urc.simulator.servers.video_process`` is started by
+`urc.simulator.servers.video_encoder`. The encoder needs milliseconds for an image, in which the
+robot must still answer commands. The process ends with its standard input.
+
+Standard input contains records: length (u32) and a flag (u8), then an image as JPEG or PNG. The
+flag is 1 if the image must become a keyframe. For each image, standard output contains one record:
+length (u32) and kind (u8), then the content. The kind ``K`` is a keyframe with its parameter sets,
+and ``U`` any other access unit. Both have the byte stream format of ITU-T H.264, Annex B. The kind
+``F`` is a fault in one line, and the last record.
+"""
+
+import os
+import struct
+import sys
+import time
+from collections.abc import Callable
+from fractions import Fraction
+from io import RawIOBase
+from typing import Any, BinaryIO, Final
+
+__all__ = [
+    "FAULT",
+    "KEYFRAME",
+    "MAX_IMAGE_BYTES",
+    "ORDER",
+    "RECORD",
+    "UNIT",
+    "ImageEncoder",
+    "main",
+]
+
+ORDER: Final = struct.Struct(">IB")
+RECORD: Final = struct.Struct(">Ic")
+KEYFRAME: Final = b"K"
+UNIT: Final = b"U"
+FAULT: Final = b"F"
+MAX_IMAGE_BYTES: Final = 8_388_608
+"""Maximum size of an image in a record, in bytes."""
+KEYFRAME_EVERY_S: Final = 1.0
+"""Time between two keyframes, in seconds. A new viewer waits for a keyframe."""
+_LIMITED, _BT601 = 1, 5
+"""Range and matrix of the colours, as numbers of the library."""
+_RATE: Final = 30
+"""Highest number of images in a second, from which the encoder computes the level of the stream."""
+_TICKS: Final = 90_000
+"""Units of a time stamp in a second."""
+_NICE: Final = 5
+"""Increment of the process's nice value, so that the robot comes before the images."""
+_PNG: Final = b"\x89PNG"
+
+
+class ImageEncoder:
+    """Encodes images one by one; each image becomes one access unit at once.
+
+    Args:
+        clock: function that returns monotonic time in seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        import av  # the extra `video`: takes 150 ms
+
+        self._av: Any = av
+        self._clock = clock
+        self._began_s = clock()
+        self._codec: Any = None
+        self._key_s = 0.0
+        self._last_pts = -1
+        self._decoders: dict[str, Any] = {}
+
+    def encode(self, image: bytes, *, is_key: bool = False) -> tuple[bool, bytes]:
+        """Return whether an image has become a keyframe, and its access unit.
+
+        Args:
+            image: JPEG or PNG.
+            is_key: whether the image must become a keyframe.
+
+        Raises:
+            av.error.FFmpegError: the image is damaged.
+        """
+        frame = self._decoded(image)
+        width, height = max(2, frame.width & ~1), max(2, frame.height & ~1)
+        if self._codec is None or (self._codec.width, self._codec.height) != (width, height):
+            self._codec, is_key = self._opened(width, height), True
+        frame = frame.reformat(width=width, height=height, format="yuv420p", dst_color_range="MPEG")
+        now_s = self._clock()
+        is_key = is_key or now_s - self._key_s >= KEYFRAME_EVERY_S
+        if is_key:
+            self._key_s = now_s
+        types = self._av.video.frame.PictureType
+        frame.pict_type = types.I if is_key else types.NONE
+        self._last_pts = max(self._last_pts + 1, round((now_s - self._began_s) * _TICKS))
+        frame.pts = self._last_pts
+        packets = self._codec.encode(frame)
+        return is_key, b"".join(bytes(one) for one in packets)
+
+    def _opened(self, width: int, height: int) -> Any:
+        codec = self._av.CodecContext.create("libx264", "w")
+        codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
+        codec.time_base, codec.framerate = Fraction(1, _TICKS), _RATE
+        codec.color_range, codec.colorspace = _LIMITED, _BT601
+        codec.gop_size = 1_000_000  # `encode` chooses the keyframes, by time
+        codec.max_b_frames = 0
+        codec.thread_count = 1
+        codec.options = {
+            "preset": "ultrafast",
+            "tune": "zerolatency",
+            "profile": "baseline",
+            "forced-idr": "1",
+        }
+        return codec
+
+    def _decoded(self, image: bytes) -> Any:
+        name = "png" if image.startswith(_PNG) else "mjpeg"
+        if name not in self._decoders:
+            self._decoders[name] = self._av.CodecContext.create(name, "r")
+        return self._decoders[name].decode(self._av.Packet(image))[0]
+
+
+def _read(source: RawIOBase, size: int) -> bytes | None:
+    """Return exactly `size` bytes; None at the end of the input."""
+    data = bytearray()
+    while len(data) < size:
+        piece = source.read(size - len(data))
+        if not piece:
+            return None
+        data += piece
+    return bytes(data)
+
+
+def _serve(source: RawIOBase, target: BinaryIO) -> None:
+    encoder = ImageEncoder()
+    while (head := _read(source, ORDER.size)) is not None:
+        size, is_key = ORDER.unpack(head)
+        if size > MAX_IMAGE_BYTES or (image := _read(source, size)) is None:
+            return
+        is_key, unit = encoder.encode(image, is_key=bool(is_key))
+        target.write(RECORD.pack(len(unit), KEYFRAME if is_key else UNIT) + unit)
+        target.flush()
+
+
+def main() -> int:
+    """Run the process; return the exit code."""
+    if hasattr(os, "nice"):
+        os.nice(_NICE)
+    source, target = os.fdopen(0, "rb", buffering=0), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # so that no library's text reaches the records
+    try:
+        _serve(source, target)
+    except OSError:
+        return 0  # the simulator has closed the pipe
+    except Exception as bug:  # supervisor: the simulator reports the reason
+        text = f"{type(bug).__name__}: {bug}".replace("\n", " ").encode()[:300]
+        target.write(RECORD.pack(len(text), FAULT) + text)
+        target.flush()
+    return 0
+
+
+if __name__ == "__main__":
+    code = main()
+    sys.stderr.flush()
+    os._exit(code)  # without waiting for the library's threads
