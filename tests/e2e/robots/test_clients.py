@@ -44,6 +44,8 @@ async def test_tello_flies_for_a_tello_library(tmp_path: Path) -> None:
             found = await ask("tello_flight.py", before=network.client)
     assert 10 < found["battery"] <= 100
     assert found["states"] > 3
+    assert len(found["video"]) > 20
+    assert set(map(tuple, found["video"])) == {(320, 240)}
 
 
 async def bound(space: tuple[str, ...], port: int) -> None:

@@ -1,8 +1,17 @@
-"""What `urc simulate` tells of frames that its robot cannot answer."""
+"""What `urc simulate` tells of frames that its robot cannot answer, and of missing packages."""
 
 import logging
+from pathlib import Path
 
+import pytest
+
+from urc.cli.rendering import warn_without_encoder
 from urc.cli.simulate import UnansweredLog
+from urc.config.load import load_profile
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.servers import camera
+
+ROBOTS = Path(__file__).parents[3] / "robots"
 
 
 class Teller:
@@ -61,3 +70,22 @@ def test_what_is_kept_does_not_grow() -> None:
     *lines, last = teller.said()
     assert len(lines) == 10
     assert last == "other frames without a reply: 985"
+
+
+def test_a_robot_without_an_encoder_for_its_video_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In one line with the command; a robot without such a camera is not."""
+    tello, puppet = (
+        load_profile(str(ROBOTS / f"{name}.yaml"), built_in_catalog())
+        for name in ("tello", "puppet")
+    )
+    warn_without_encoder(tello)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(camera, "has_encoder", lambda: False)
+    warn_without_encoder(puppet)
+    warn_without_encoder(tello)
+    said = capsys.readouterr().err
+    assert said.startswith("urc: the emulated tello sends no video, which requires av; to install")
+    assert "install 'av" in said
+    assert said.count("\n") == 1

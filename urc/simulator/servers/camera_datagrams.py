@@ -78,6 +78,8 @@ class DatagramReceiver:
             log.info("transport %s: no way to %s (%s)", self._context.name, host, fault)
 
     def _send_image(self, data: bytes) -> None:
+        if len(data) % _DATAGRAM == 0:
+            data += b"\0"  # programs take a shorter datagram for the end of an image
         for start in range(0, len(data), _DATAGRAM):
             if not self._line.loses:
                 self._send(data[start : start + _DATAGRAM])

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
+import av
 from tello_asyncio import Tello
 
 WAIT_S = 45.0
@@ -18,6 +19,7 @@ WAIT_S = 45.0
 
 async def main() -> dict[str, Any]:
     states: list[Any] = []
+    frames: list[bytes] = []
     drone = Tello(on_state=lambda _, state: states.append(state))
 
     async def until(is_true: Callable[[Any], bool]) -> None:
@@ -28,6 +30,7 @@ async def main() -> dict[str, Any]:
     await drone.connect()
     found: dict[str, Any] = {"battery": await drone.query_battery()}
     await until(lambda state: state.height == 0)
+    await drone.start_video(lambda _, frame: frames.append(frame))
     await drone.takeoff()
     await until(lambda state: state.height > 20)
     height = states[-1].height
@@ -41,9 +44,19 @@ async def main() -> dict[str, Any]:
     await until(lambda state: state.velocity.x == 0 and state.velocity.y == 0)
     await drone.land()
     await until(lambda state: state.height == 0)
+    await drone.stop_video()
     found["states"] = len(states)
+    found["video"] = sizes_of(frames)
     await drone.disconnect()
     return found
+
+
+def sizes_of(frames: list[bytes]) -> list[tuple[int, int]]:
+    """Decode what the library takes for images, in their order; return the size of each."""
+    decoder = av.CodecContext.create("h264", "r")
+    packets = [packet for frame in (*frames, b"") for packet in decoder.parse(frame)]
+    images = [image for packet in packets for image in decoder.decode(packet)]
+    return [(image.width, image.height) for image in (*images, *decoder.decode(None))]
 
 
 if __name__ == "__main__":

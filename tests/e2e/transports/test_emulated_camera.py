@@ -1,0 +1,434 @@
+"""Emulated cameras, seen by programs of others: FFmpeg's reader of UDP, and Debian's ffprobe."""
+
+import asyncio
+import json
+import logging
+import os
+import signal
+import socket
+import struct
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import av
+import pytest
+
+from tests.e2e.ports import free_port
+from tests.e2e.robots.emulated import told
+from urc.config.load import load_profile
+from urc.runtime.registries import built_in_catalog
+from urc.simulator.emulated_robot import EmulatedRobot
+from urc.simulator.server import serve
+from urc.simulator.servers import camera, camera_images
+from urc.simulator.servers.camera_datagrams import PROBE
+from urc.transports.base import TransportSetup
+from urc.transports.camera import from_setup
+from urc.video import read_unit
+
+pytestmark = pytest.mark.anyio
+
+ROBOTS: Final = Path(__file__).parents[3] / "robots"
+WAIT_S: Final = 30.0
+
+
+class Drone(NamedTuple):
+    """The emulated Tello, and a socket that commands it."""
+
+    robot: EmulatedRobot
+    port: int
+    """Port to which the drone sends its video."""
+    line: socket.socket
+
+    async def ask(self, word: str) -> str:
+        """Send a command and return the reply."""
+        loop = asyncio.get_running_loop()
+        await loop.sock_sendall(self.line, word.encode())
+        async with asyncio.timeout(WAIT_S):
+            return (await loop.sock_recv(self.line, 1000)).decode()
+
+
+@asynccontextmanager
+async def drone() -> AsyncIterator[Drone]:
+    """Emulate the Tello on free ports, but its video on a port that the test knows."""
+    profile = load_profile(str(ROBOTS / "tello.yaml"), built_in_catalog())
+    video_port = free_port()
+    settings = {name: one.default for name, one in profile.settings.items()}
+    settings |= {"command_port": 0, "state_port": free_port(), "video_port": video_port}
+    robot = EmulatedRobot(profile, settings)
+    async with serve(profile, settings, emulated_robot=robot) as places:
+        assert places["camera"].port == video_port
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.setblocking(False)
+            line.connect(("127.0.0.1", places["control"].port))
+            yield Drone(robot, video_port, line)
+    assert encoders() == []
+
+
+def encoders() -> list[int]:
+    """Return the encoding processes that this test has started."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        with suppress(OSError, IndexError):
+            if folder.name.isdigit() and b"video_process" in (folder / "cmdline").read_bytes():
+                rest = (folder / "stat").read_bytes().rpartition(b")")[2].split()
+                if int(rest[1]) == os.getpid() and rest[0] != b"Z":
+                    found.append(int(folder.name))
+    return found
+
+
+async def until_encoders(count: int) -> list[int]:
+    """Wait until so many encoding processes run."""
+    async with asyncio.timeout(WAIT_S):
+        while len(encoders()) != count:  # noqa: ASYNC110 - another process tells nobody
+            await asyncio.sleep(0.05)
+    return encoders()
+
+
+@asynccontextmanager
+async def bound(port: int) -> AsyncIterator[socket.socket]:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
+        listener.bind(("127.0.0.1", port))
+        listener.setblocking(False)
+        yield listener
+
+
+async def datagram(listener: socket.socket) -> bytes:
+    async with asyncio.timeout(WAIT_S):
+        return await asyncio.get_running_loop().sock_recv(listener, 65_536)
+
+
+def filmed(port: int, count: int) -> list[Any]:
+    """Read images with the library's own reader of UDP and its own decoder."""
+    limits = {"probesize": "50000", "analyzeduration": "300000"}
+    with av.open(
+        f"udp://127.0.0.1:{port}", format="h264", options=limits, timeout=WAIT_S
+    ) as container:
+        found = []
+        for frame in container.decode(video=0):
+            found.append(frame)
+            if len(found) == count:
+                break
+        return found
+
+
+def brightness(frame: Any) -> Any:
+    return frame.to_ndarray(format="gray").astype(float)
+
+
+async def test_the_library_reads_the_video_of_the_drone_and_sees_it_turn() -> None:
+    """The present image each time, of the size in the profile."""
+    async with drone() as one:
+        assert await one.ask("command") == "ok"
+        assert await one.ask("streamon") == "ok"
+        before = await asyncio.to_thread(filmed, one.port, 15)
+        assert {(frame.width, frame.height) for frame in before} == {(320, 240)}
+        assert await one.ask("takeoff") == "ok"
+        assert await one.ask("cw 90") == "ok"
+        async with asyncio.timeout(WAIT_S):
+            body = one.robot.body
+            assert body is not None
+            while abs(body.world.motion.yaw) < 1.0:  # noqa: ASYNC110 - the world has no event
+                await asyncio.sleep(0.05)
+        after = await asyncio.to_thread(filmed, one.port, 15)
+        still = abs(brightness(before[-1]) - brightness(before[-5])).mean()
+        turned = abs(brightness(after[-1]) - brightness(before[-1])).mean()
+        assert turned > 10 * max(still, 0.5)
+
+
+@pytest.mark.needs("ffmpeg")
+async def test_ffprobe_reads_it() -> None:
+    async with drone() as one:
+        await one.ask("streamon")
+        shown = "stream=codec_name,profile,width,height,has_b_frames:packet=flags"
+        found = json.loads(
+            await told(
+                *("ffprobe", "-v", "error", "-of", "json", "-show_entries", shown),
+                *("-read_intervals", "%+#25"),
+                *("-f", "h264", f"udp://127.0.0.1:{one.port}"),
+            )
+        )
+    (stream,) = found["streams"]
+    assert stream["codec_name"] == "h264"
+    assert stream["profile"] == "Constrained Baseline"
+    assert (stream["width"], stream["height"], stream["has_b_frames"]) == (320, 240, 0)
+    flags = [packet["flags"][0] for packet in found["packets"]]
+    keys = [place for place, flag in enumerate(flags) if flag == "K"]
+    assert len(flags) == 25
+    assert len(keys) >= 2
+    assert max(later - early for early, later in pairwise(keys)) <= 12
+
+
+async def test_video_comes_only_between_streamon_and_streamoff() -> None:
+    """No process encodes before; the datagrams are as long as those of the drone."""
+    async with drone() as one, bound(one.port) as listener:
+        await one.ask("command")
+        assert await datagram(listener) == PROBE
+        for _ in range(5):  # the drone lives
+            await one.ask("battery?")
+        assert encoders() == []
+        await one.ask("streamon")
+        sizes = [len(await datagram(listener)) for _ in range(60)]
+        assert 1000 < max(sizes) <= 1460
+        await until_encoders(1)
+        await one.ask("streamoff")
+        await until_encoders(0)
+        with suppress(BlockingIOError):
+            while listener.recv(65_536):
+                pass
+        await one.ask("battery?")
+        with pytest.raises(BlockingIOError):
+            listener.recv(65_536)
+
+
+async def test_nothing_is_encoded_while_nobody_listens() -> None:
+    """The first image for a new listener is a keyframe."""
+    async with drone() as one:
+        await one.ask("streamon")
+        for _ in range(10):
+            await one.ask("battery?")
+            await asyncio.sleep(camera_images.IMAGE_EVERY_S)
+        assert encoders() == []
+        for _ in range(2):
+            async with bound(one.port) as listener:
+                pieces = [await datagram(listener) for _ in range(4)]
+                assert pieces[0] == PROBE
+                first = next(piece for piece in pieces if piece != PROBE)
+                assert first[:5] == b"\0\0\0\1\x67"
+            await until_encoders(0)
+
+
+async def test_an_encoder_that_dies_is_replaced_and_delays_no_answer(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(camera_images, "RETRY_S", 0.5)
+    async with drone() as one, bound(one.port) as listener:
+        await one.ask("streamon")
+        while await datagram(listener) == PROBE:
+            pass
+        (before,) = await until_encoders(1)
+        with caplog.at_level(logging.WARNING):
+            os.kill(before, signal.SIGKILL)
+            async with asyncio.timeout(WAIT_S):
+                while encoders() in ([], [before]):
+                    assert await one.ask("battery?")
+                    await asyncio.sleep(0.05)
+        assert [entry.getMessage() for entry in caplog.records] == [
+            "transport camera: the process that encodes the video has failed"
+        ]
+        with suppress(BlockingIOError):
+            while listener.recv(65_536):
+                pass
+        assert await datagram(listener)
+
+
+async def test_urc_reads_it() -> None:
+    """Each access unit with its size; a new connection begins with a keyframe."""
+    async with drone() as one:
+        await one.ask("streamon")
+        options = {"url": f"udp://127.0.0.1:{one.port}", "host": "127.0.0.1"}
+        transport = from_setup(TransportSetup("camera", options))
+        for _ in range(2):
+            await transport.open(10.0)
+            try:
+                async with asyncio.timeout(WAIT_S):
+                    values = [await transport.receive() for _ in range(12)]
+            finally:
+                await transport.close()
+            units = [read_unit(value) for value in values if isinstance(value, bytes)]
+            assert units[0] is not None
+            assert units[0].is_key
+            assert {unit and unit[2:4] for unit in units} == {(320, 240)}
+
+
+async def test_without_the_package_the_drone_flies(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(camera, "has_encoder", lambda: False)
+    profile = load_profile(str(ROBOTS / "tello.yaml"), built_in_catalog())
+    settings = {name: one.default for name, one in profile.settings.items()}
+    async with serve(profile, settings, is_anywhere=True) as places:
+        assert places["camera"].text == "camera without video (the package av is missing)"
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+            line.setblocking(False)
+            line.connect(("127.0.0.1", places["control"].port))
+            one = Drone(EmulatedRobot(profile, settings), 0, line)
+            assert [await one.ask(word) for word in ("command", "streamon")] == ["ok", "ok"]
+
+
+# Cameras with RTSP
+
+EYE: Final = """
+urc: 1
+kind: robot
+name: eye
+settings: {{ password: {{ type: string, secret: true, required: false }} }}
+transports:
+  eye:
+    type: camera
+    url: "rtsp://127.0.0.1:{port}/stream1"
+    auth: {{ type: digest, user: viewer, password: "{{{{ settings.password }}}}" }}
+  wire: {{ type: udp, host: 127.0.0.1, port: 9, encoding: ascii }}
+signals:
+  picture: {{ type: video }}
+messages:
+  picture: {{ from: eye, raw: picture }}
+simulator:
+  world:
+    body: {{ type: differential }}
+    camera: {{ width: 640, height: 480 }}
+    signals: {{ picture: "{{{{ world.picture }}}}" }}
+"""
+PASSWORD: Final = "s3cret:x@"  # noqa: S105 - of the test's camera
+LOGIN: Final = "viewer:s3cret%3Ax%40@"
+
+
+@asynccontextmanager
+async def rtsp_camera(folder: Path, *, has_login: bool = True) -> AsyncIterator[int]:
+    """Emulate a camera with RTSP; give its port."""
+    file, text = folder / "eye.yaml", EYE.format(port=free_port())
+    lines = [one for one in text.splitlines(True) if has_login or "auth:" not in one]
+    file.write_text("".join(lines), "utf-8")
+    profile = load_profile(str(file), built_in_catalog())
+    settings = {"password": PASSWORD}
+    async with serve(profile, settings, is_anywhere=True) as places:
+        yield places["eye"].port
+    assert encoders() == []
+
+
+@pytest.mark.needs("ffmpeg")
+@pytest.mark.parametrize("over", ["tcp", "udp"])
+async def test_ffprobe_reads_rtsp(over: str, tmp_path: Path) -> None:
+    """With a password, in packets smaller than a keyframe."""
+    async with rtsp_camera(tmp_path) as port:
+        shown = "stream=codec_name,width,height:packet=flags,size"
+        found = json.loads(
+            await told(
+                *("ffprobe", "-v", "error", "-of", "json", "-show_entries", shown),
+                *("-read_intervals", "%+#15", "-rtsp_transport", over),
+                f"rtsp://{LOGIN}127.0.0.1:{port}/stream1",
+            )
+        )
+        assert found["streams"] == [{"codec_name": "h264", "width": 640, "height": 480}]
+        keys = [int(one["size"]) for one in found["packets"] if one["flags"].startswith("K")]
+        assert max(keys) > 2000
+        await until_encoders(0)  # nobody plays the stream any longer
+
+
+@pytest.mark.needs("ffmpeg")
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [("stream1", "401 Unauthorized"), ("elsewhere", "404 Not Found")],
+)
+async def test_a_wrong_password_or_path_is_refused(place: str, words: str, tmp_path: Path) -> None:
+    async with rtsp_camera(tmp_path) as port:
+        login = "viewer:guess@" if place == "stream1" else LOGIN
+        url = f"rtsp://{login}127.0.0.1:{port}/{place}"
+        process = await asyncio.create_subprocess_exec(
+            *("ffprobe", "-v", "error", url), stderr=asyncio.subprocess.PIPE
+        )
+        async with asyncio.timeout(WAIT_S):
+            _, said = await process.communicate()
+        assert words in said.decode()
+        assert encoders() == []
+
+
+@pytest.mark.parametrize("rtp", ["tcp", "udp"])
+async def test_urc_reads_rtsp_with_its_time_of_capture(rtp: str, tmp_path: Path) -> None:
+    auth = {"type": "digest", "user": "viewer", "password": PASSWORD}
+    async with rtsp_camera(tmp_path) as port:
+        options = {"url": f"rtsp://127.0.0.1:{port}/stream1", "rtp": rtp, "auth": auth}
+        transport = from_setup(TransportSetup("eye", options))
+        await transport.open(10.0)
+        try:
+            async with asyncio.timeout(WAIT_S):
+                values = [await transport.receive() for _ in range(25)]
+        finally:
+            await transport.close()
+        units = [read_unit(value) for value in values if isinstance(value, bytes)]
+        assert units[0] is not None
+        assert units[0].is_key
+        assert {unit and unit[2:4] for unit in units} == {(640, 480)}
+        times = [unit.time_s for unit in units if unit is not None]
+        assert times == sorted(times)
+
+
+async def rtsp_says(port: int, *requests: bytes) -> bytes:
+    """Send bytes to the camera; return all that it says until it or the client closes."""
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.writelines(requests)
+    writer.write_eof()
+    async with asyncio.timeout(WAIT_S):
+        said = await reader.read()
+    writer.close()
+    await writer.wait_closed()
+    return said
+
+
+async def test_odd_requests_are_answered_or_refused_and_harm_nobody(tmp_path: Path) -> None:
+    """Reports between requests are skipped; what is no request ends the connection."""
+    ask = b"OPTIONS rtsp://c/stream1 RTSP/1.0\r\nCSeq: 7\r\n\r\n"
+    async with rtsp_camera(tmp_path) as port:
+        said = await rtsp_says(port, b"$\x01\x00\x04abcd", ask, b"\r\n", ask)
+        assert said.count(b"RTSP/1.0 200 OK\r\nCSeq: 7\r\nPublic: OPTIONS, DESCRIBE") == 2
+        asked = b"DESCRIBE rtsp://c/stream1 RTSP/1.0\r\nCSeq: 1\r\n\r\n"
+        assert (await rtsp_says(port, asked)).startswith(b"RTSP/1.0 401 Unauthorized\r\nCSeq: 1")
+        for bad in (b"GET / HTTP/1.1\r\n\r\n", b"x" * 100_000, b"A: b\r\n" * 5000, b"\0\1\r\n\r\n"):
+            assert (await rtsp_says(port, bad)).startswith(b"RTSP/1.0 400 Bad Request")
+        for cut in (b"OPT", b"$\x01\xff\xff", b""):
+            assert await rtsp_says(port, cut) == b""
+        assert encoders() == []
+        assert (await rtsp_says(port, ask)).startswith(b"RTSP/1.0 200 OK")
+
+
+def asked(method: str, *headers: str) -> bytes:
+    head = [f"{method} rtsp://c/stream1 RTSP/1.0", "CSeq: 1", *headers, "", ""]
+    return "\r\n".join(head).encode()
+
+
+TCP: Final = "Transport: RTP/AVP/TCP;unicast;interleaved=2-3"
+ORDERS: Final = [
+    ([asked("PLAY")], [455]),
+    ([asked("SETUP", "Transport: RTP/AVP;multicast;client_port=5000-5001")], [461]),
+    ([asked("SETUP", "Transport: RTP/AVP;unicast;client_port=0-99999")], [461]),
+    ([asked("SETUP", "Transport: RTP/AVP/TCP;interleaved=255-256")], [461]),
+    ([asked("SETUP")], [461]),
+    ([asked("SETUP", TCP), asked("SETUP", TCP)], [200, 455]),
+    ([asked("SETUP", "Transport: RAW,RTP/AVP/TCP"), asked("PLAY", "Session: 1")], [200, 454]),
+    ([asked("RECORD")], [501]),
+    ([asked("DESCRIBE", "Content-Length: 4") + b"body", asked("OPTIONS")], [200, 200]),
+    ([asked("TEARDOWN"), asked("OPTIONS")], [200]),
+]
+
+
+@pytest.mark.parametrize(("requests", "statuses"), ORDERS)
+async def test_each_request_has_its_status(
+    requests: list[bytes], statuses: list[int], tmp_path: Path
+) -> None:
+    """RFC 2326, 7.1.1 and A.1. A connection is closed after TEARDOWN."""
+    async with rtsp_camera(tmp_path, has_login=False) as port:
+        said = await rtsp_says(port, *requests)
+    lines = [line for line in said.decode().split("\r\n") if line.startswith("RTSP/1.0 ")]
+    assert [int(line.split()[1]) for line in lines] == statuses
+
+
+async def test_a_client_on_its_own_channels_gets_a_report_and_then_a_keyframe(
+    tmp_path: Path,
+) -> None:
+    """The stream begins with the parameter sets; after the client, nothing is encoded."""
+    async with rtsp_camera(tmp_path, has_login=False) as port:
+        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        writer.write(asked("SETUP", TCP) + asked("PLAY"))
+        async with asyncio.timeout(WAIT_S):
+            head = await reader.readuntil(b"$\x03")  # the first report
+            assert head.count(b"RTSP/1.0 200 OK") == 2
+            assert b"Transport: RTP/AVP/TCP;unicast;interleaved=2-3" in head
+            size = int.from_bytes(await reader.readexactly(2), "big")
+            report = await reader.readexactly(size)
+            assert report[:2] == b"\x80\xc8"
+            channel, length = struct.unpack(">xBH", await reader.readexactly(4))
+            first = await reader.readexactly(length)
+            assert (channel, first[12] & 0x1F) == (2, 7)
+        writer.close()
+        await writer.wait_closed()
+        await until_encoders(0)
