@@ -256,7 +256,8 @@ class Plot {
 
   tellSpan() {
     const { spanS } = this.live;
-    write(this.spanText, this.ctx.t("last {time}", { time: spanS % 60 === 0 && spanS > 60 ? `${spanS / 60} min` : `${spanS} s` }));
+    const time = spanS % 60 === 0 && spanS > 60 ? `${spanS / 60} min` : `${spanS} s`;
+    write(this.spanText, this.ctx.t("last {time}", { time }));
   }
 
   /** @returns {[string, number][]} */
