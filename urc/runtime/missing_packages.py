@@ -8,10 +8,10 @@ from urc.model.values import Value
 from urc.problems import UrcError
 from urc.registry import Table
 from urc.runtime.document_tests import sample_settings
-from urc.runtime.transport_chain import absent_cameras, alone, make_transports
+from urc.runtime.transport_chain import UNGUARDED, absent_cameras, alone, make_transports
 from urc.transports.base import MissingPackage
 
-__all__ = ["MissingPackages", "missing_packages"]
+__all__ = ["MissingPackages", "dark_videos", "missing_packages"]
 
 _WITHOUT_EXTRA: Final = frozenset(("tcp", "udp", "ssh", "telnet", "http", "websocket"))
 """Types that need no extra; they are not built, because `urc validate` should stay fast."""
@@ -66,3 +66,13 @@ def missing_packages(
     return MissingPackages(
         tuple(dict.fromkeys(found)), tuple(dict.fromkeys(map(str, cameras.values())))
     )
+
+
+def dark_videos(profile: Profile, table: Table) -> frozenset[str]:
+    """Return the signals of cameras whose package is missing; they never have an image."""
+    driver = profile.driver
+    if all(spec.type not in UNGUARDED for spec in driver.transports.values()):
+        return frozenset()
+    absent = absent_cameras(driver, sample_settings(profile.settings), table)
+    dark = (one.read.fields for one in driver.messages.values() if one.transport in absent)
+    return frozenset(name for fields in dark for name in fields)

@@ -8,7 +8,7 @@ from urc.cli import dashboard
 from urc.config.load import load_profile
 from urc.model.profile import Profile
 from urc.registry import Table
-from urc.runtime.missing_packages import missing_packages
+from urc.runtime.missing_packages import dark_videos, missing_packages
 from urc.runtime.probe import probe
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.session import Motion, Session
@@ -86,6 +86,15 @@ async def test_a_robot_of_cameras_alone_needs_the_package(tmp_path: Path) -> Non
     assert str(told.value).startswith(NAMED)
     (needed,) = missing_packages(profile, {}, table()).needed
     assert needed.startswith(NAMED)
+
+
+def test_only_the_videos_of_cameras_without_a_package_stay_dark(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile = profile_of(tmp_path, DRONE.replace("WIRE", WIRE))
+    assert dark_videos(profile, table()) == {"picture"}
+    monkeypatch.setattr(camera, "find_spec", lambda _: object())
+    assert dark_videos(profile, table()) == frozenset()
 
 
 def test_the_terminal_says_that_only_the_video_is_missing(

@@ -4,7 +4,7 @@ import json
 
 from urc.model.driver import Argument, Command, Driver
 from urc.model.exchange import Confirm, Hold
-from urc.model.interface import Interface, Tab
+from urc.model.interface import Interface, Tab, WidgetUse
 from urc.model.payload import WriteSpec
 from urc.model.profile import Profile
 from urc.model.values import Signal
@@ -35,6 +35,21 @@ def test_the_address_goes_before_what_the_device_has_kept() -> None:
     assert chosen(PROFILE, None, "two") is TWO
     assert chosen(PROFILE, "one", "two") is ONE
     assert chosen(PROFILE, "debug") is DEBUGGING
+
+
+def test_a_background_that_never_has_an_image_is_not_the_first() -> None:
+    """Without the package for video, the next interface is shown, unless a person chose."""
+    camera = WidgetUse("eye", "camera", {"image": "video"})
+    fly = Interface("fly", background="eye", widgets={"eye": camera})
+    level = WidgetUse("level", "attitude", {"roll": "r", "pitch": "video"})
+    hover = Interface("hover", background="level", widgets={"level": level})
+    both = PROFILE._replace(interfaces={"fly": fly, "hover": hover})
+    assert chosen(both, None) is fly
+    assert chosen(both, None, dark={"video"}) is hover
+    assert chosen(both, "fly", dark={"video"}) is fly
+    assert chosen(both, None, "fly", dark={"video"}) is fly
+    alone = PROFILE._replace(interfaces={"fly": fly})
+    assert chosen(alone, None, dark={"video"}) is fly, "nothing else to show"
 
 
 def test_what_is_not_there_any_more_is_passed_over_when_it_was_only_kept() -> None:

@@ -4,7 +4,7 @@ Layer 5. Pure. Each robot also has a generated debug interface.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Final
 from urllib.parse import quote
@@ -73,19 +73,32 @@ class DebugPart:
     dev_url: str
 
 
-def chosen(profile: Profile, wanted: str | None, kept: str = "") -> Interface | None:
+def chosen(
+    profile: Profile, wanted: str | None, kept: str = "", *, dark: Collection[str] = ()
+) -> Interface | None:
     """Return the interface to show; None if the robot has no interface named `wanted`.
+
+    The first interface whose background can have an image is the default.
 
     Args:
         profile: profile of the robot.
         wanted: name of the interface in the URL; None for a URL without an interface.
         kept: name of the interface that the device last showed; ignored if the interface no longer
             exists.
+        dark: signals that never have an image, because a camera's package is missing.
     """
     known = {**profile.interfaces, DEBUG: DEBUGGING}
     if wanted is not None:
         return known.get(wanted)
-    return known.get(kept) or next(iter(known.values()))
+    bright = (one for one in profile.interfaces.values() if not _is_dark(profile, one, dark))
+    return known.get(kept) or next(bright, None) or next(iter(known.values()))
+
+
+def _is_dark(profile: Profile, interface: Interface, dark: Collection[str]) -> bool:
+    """Return whether the interface's background shows only signals in `dark`."""
+    slot = interface.background
+    use = interface.widgets.get(slot) or profile.slots.get(slot)
+    return use is not None and bool(use.inputs) and all(one in dark for one in use.inputs.values())
 
 
 def choices(
