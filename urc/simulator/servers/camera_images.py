@@ -15,8 +15,9 @@ from urc.simulator.servers.video_encoder import EncodedUnit, EncoderFault, Video
 
 __all__ = ["IMAGE_EVERY_S", "CameraImages", "Receiver"]
 
-IMAGE_EVERY_S: Final = 0.1
-"""Time between two images, in seconds; a world draws its images no faster."""
+IMAGE_EVERY_S: Final = 0.05
+"""Time between two images, in seconds, half as long as between two new images of a world. Readers
+deliver an image when the next one begins, and need several images to detect the format."""
 KEPT_S: Final = 5.0
 """Time without images after which the encoding process ends, in seconds."""
 RETRY_S: Final = 10.0
