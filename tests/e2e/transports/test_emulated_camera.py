@@ -19,6 +19,7 @@ import pytest
 from tests.e2e.ports import free_port
 from tests.e2e.robots.emulated import told
 from urc.config.load import load_profile
+from urc.problems import UrcError
 from urc.runtime.registries import built_in_catalog
 from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.server import serve
@@ -248,7 +249,7 @@ async def test_without_the_package_the_drone_flies(monkeypatch: pytest.MonkeyPat
     profile = load_profile(str(ROBOTS / "tello.yaml"), built_in_catalog())
     settings = {name: one.default for name, one in profile.settings.items()}
     async with serve(profile, settings, is_anywhere=True) as places:
-        assert places["camera"].text == "camera without video (the package av is missing)"
+        assert places["camera"].text == "camera, without video: the package av is missing"
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
             line.setblocking(False)
             line.connect(("127.0.0.1", places["control"].port))
@@ -432,3 +433,43 @@ async def test_a_client_on_its_own_channels_gets_a_report_and_then_a_keyframe(
         writer.close()
         await writer.wait_closed()
         await until_encoders(0)
+
+
+async def test_two_emulated_drones_send_to_ports_of_their_own() -> None:
+    """Neither to the port of the real drone, as two demos on one computer."""
+    profile = load_profile(str(ROBOTS / "tello.yaml"), built_in_catalog())
+    settings = {name: one.default for name, one in profile.settings.items()}
+    async with (
+        serve(profile, settings, is_anywhere=True) as first,
+        serve(profile, settings, is_anywhere=True) as second,
+    ):
+        ports = {first["camera"].port, second["camera"].port}
+    assert len(ports) == 2
+    assert 11111 not in ports
+
+
+async def test_a_camera_over_http_is_emulated_only_on_a_free_port(tmp_path: Path) -> None:
+    """Without its password, which datagrams do not have."""
+    file, text = tmp_path / "eye.yaml", EYE.format(port=554)
+    text = text.replace("rtsp://127.0.0.1:554/stream1", "http://10.0.0.2/live.ts")
+    file.write_text(text, "utf-8")
+    profile = load_profile(str(file), built_in_catalog())
+    settings = {"password": PASSWORD}
+    with pytest.raises(UrcError) as refused:
+        async with serve(profile, settings):
+            pytest.fail("it is emulated")
+    assert str(refused.value) == (
+        "transports.eye.url: a camera is emulated at an rtsp:// or udp:// URL with a port, not at"
+        " 'http://10.0.0.2/live.ts'"
+    )
+    async with serve(profile, settings, is_anywhere=True) as places:
+        options = {**profile.driver.transports["eye"].options, **places["eye"].options}
+        transport = from_setup(TransportSetup("eye", options))
+        await transport.open(10.0)
+        try:
+            async with asyncio.timeout(WAIT_S):
+                value = await transport.receive()
+        finally:
+            await transport.close()
+    assert isinstance(value, bytes)
+    assert read_unit(value) is not None

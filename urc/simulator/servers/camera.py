@@ -78,7 +78,7 @@ class CameraServer:
 
 
 def _silent(options: dict[str, object]) -> Endpoint:
-    return Endpoint("", 0, "camera without video (the package av is missing)", options)
+    return Endpoint("", 0, "camera, without video: the package av is missing", options)
 
 
 def _port(context: ServerContext, url: str) -> int:
