@@ -1,16 +1,39 @@
-"""Packets with encoded images, cut by RFC 6184 and RFC 7798, as a sender would."""
+"""Encoded films, and their packets, cut by RFC 6184 and RFC 7798, as a sender would."""
 
+import io
 from collections.abc import Iterable, Iterator
+
+import av
+import numpy as np
 
 from urc._h264 import nal_units
 from urc.transports.rtp_assembler import RtpPiece
 
-__all__ = ["MTU", "payloads_of", "pieces_of", "with_start_codes"]
+__all__ = ["MTU", "film", "payloads_of", "pieces_of", "with_start_codes"]
 
 MTU = 300
 """Small, so that even small images need several packets."""
 STEP = 3000
 """Ticks between two images: 30 images a second."""
+
+
+def film(count: int, *, is_hevc: bool = False) -> list[bytes]:
+    """Return the access units of a film of coloured squares; each second one is a keyframe."""
+    noise, target = np.random.default_rng(7), io.BytesIO()
+    options = {"tune": "zerolatency", "preset": "ultrafast", "x264opts": "scenecut=0:slices=2"}
+    if is_hevc:
+        options["x265-params"] = "log-level=none:scenecut=0:keyint=2:min-keyint=2"
+    with av.open(target, "w", format="hevc" if is_hevc else "h264") as container:
+        stream = container.add_stream("libx265" if is_hevc else "libx264", rate=30, options=options)
+        assert isinstance(stream, av.VideoStream)
+        stream.width, stream.height, stream.pix_fmt, stream.gop_size = 320, 240, "yuv420p", 2
+        packets = []
+        for _ in range(count):
+            blocks = noise.integers(0, 256, (6, 8, 3), np.uint8)
+            image = np.kron(blocks, np.ones((40, 40, 1), np.uint8))
+            packets += stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24"))
+        packets += stream.encode(None)
+    return [bytes(packet) for packet in packets]
 
 
 def with_start_codes(unit: bytes) -> bytes:

@@ -6,15 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.unit.test_video import encoded
-from tests.unit.transports.rtp_packets import pieces_of, with_start_codes
+from tests.unit.transports.rtp_packets import film, pieces_of, with_start_codes
 from urc.transports.rtp_assembler import MOST_WAITING, RtpAssembler, RtpImage, RtpPiece
 from urc.transports.rtp_payload import PAYLOADS, BadPayload
 from urc.video import MAX_UNIT_BYTES
 
-AVC = encoded("libx264", 320, 240, 8, tune="zerolatency", qp="1", x264opts="slices=2")
-HEVC = encoded("libx265", 320, 240, 8, tune="zerolatency", **{"x265-params": "log-level=none:qp=1"})
-FILMS = {False: AVC, True: HEVC}
+AVC = film(8)
+FILMS = {False: AVC, True: film(8, is_hevc=True)}
 SPS, KEY, DELTA = b"\x67\x42\x00\x1e", b"\x65image", b"\x41change"
 
 

@@ -19,8 +19,7 @@ from aiortc.rtp import (
     RtpPacket,
 )
 
-from tests.unit.test_video import encoded
-from tests.unit.transports.rtp_packets import pieces_of
+from tests.unit.transports.rtp_packets import film, pieces_of
 from urc.transports.camera_records import RECORD, UNIT, UnitQueue
 from urc.transports.rtp_assembler import WAIT_S, RtpPiece
 from urc.transports.whep_line import CameraLine
@@ -31,7 +30,7 @@ from urc.video_reader import VideoFault
 
 pytestmark = pytest.mark.anyio
 
-FILM = encoded("libx264", 320, 240, 6, tune="zerolatency", qp="1")
+FILM = film(6)
 ANSWER = WhepAnswer(
     "abCD", "x" * 22, True, (("sha-256", "AB"),), False, ((102, False),), (IceHost("a", 1, 1, "1"),)
 )
