@@ -19,6 +19,7 @@ from tests.e2e.motion.driving import PUSH_S, fresh, push_until
 from tests.e2e.motion.test_driving_lock import PROFILE, moves
 from tests.e2e.ports import free_port
 from tests.e2e.projector import Projector, projecting
+from tests.films import FilmKind
 
 pytestmark = pytest.mark.anyio
 
@@ -79,12 +80,13 @@ async def test_an_encoder_that_repeats_its_picture_stops_the_cart(
         await until(lambda: cart.heard[-1] == "V 0")
 
 
-async def test_a_still_scene_with_the_noise_of_a_sensor_is_not_marked(
-    new_page: PageMaker, tmp_path: Path
+@pytest.mark.parametrize("scene", ["noisy", "moving"])
+async def test_neither_a_moving_scene_nor_the_noise_of_a_sensor_is_marked(
+    scene: FilmKind, new_page: PageMaker, tmp_path: Path
 ) -> None:
-    """The robot stands still as well, and may start at any time."""
+    """In a still scene, the robot stands still as well, and may start at any time."""
     async with projected_cart(new_page, tmp_path) as (cart, page, projector):
-        projector.kind = "noisy"
+        projector.kind = scene
         await asyncio.sleep(PUSH_S)
         await page.evaluate(LISTEN)
         await push_until(lambda: moves(cart), page, PAD)

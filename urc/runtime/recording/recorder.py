@@ -5,7 +5,8 @@ never waits for a disk, because motion uses the same event loop. A separate thre
 work: reading the document, creating the file, and writing. The thread flushes the file once a
 second. A killed process therefore loses at most the last second of events and the end records of
 the file. If the queue is full, new events are lost, and the file contains a count of the lost
-events. If the disk is full, the recording ends, and `fault` contains the reason.
+events. Of a video, all images up to the next keyframe are then left out, because they could not be
+decoded. If the disk is full, the recording ends, and `fault` contains the reason.
 """
 
 import asyncio
@@ -31,6 +32,7 @@ from urc.runtime.hub import EventTap, Hub, LogEntry, Tapped, Traffic
 from urc.runtime.recording.shapes import PROFILE, RecordingEncoder, channels
 from urc.runtime.recording.widget_files import attach_files
 from urc.runtime.widget_registry import widget_folder_of
+from urc.video import read_unit
 
 __all__ = ["Recorder", "RecordingStep", "check_installed", "named", "recorded"]
 
@@ -107,6 +109,10 @@ class Recorder:
         self._waiting: deque[Tapped] = deque()
         self._waiting_bytes = 0
         self._lost = 0
+        driver = profile.driver
+        self._videos = {name for name, one in driver.signals.items() if one.type == "video"}
+        self._broken: set[str] = set()
+        """Videos of which an access unit was lost, up to their next keyframe."""
         self._wakes = threading.Condition()
         self._is_closing = False
         self._is_faulty = False
@@ -118,15 +124,31 @@ class Recorder:
         """Queue events, together with the number of events lost before them; return immediately."""
         with self._wakes:
             self._lost += lost
+            if lost:
+                self._broken |= self._videos
             for event in events:
                 size = _size(event)
                 is_full = len(self._waiting) >= MOST_WAITING
-                if self.fault or is_full or self._waiting_bytes + size > MOST_WAITING_BYTES:
+                is_full = is_full or self._waiting_bytes + size > MOST_WAITING_BYTES
+                if self.fault or self._is_useless(event, is_full=is_full) or is_full:
                     self._lost += 1
                 else:
                     self._waiting.append(event)
                     self._waiting_bytes += size
             self._wakes.notify()
+
+    def _is_useless(self, event: Tapped, *, is_full: bool) -> bool:
+        """Return whether an event is an access unit whose predecessors were lost."""
+        if not isinstance(event, Sample) or event.signal not in self._videos:
+            return False
+        unit = read_unit(event.value) if isinstance(event.value, bytes) else None
+        if unit is None:
+            return False
+        if is_full:
+            self._broken.add(event.signal)
+        elif unit.is_key:
+            self._broken.discard(event.signal)
+        return event.signal in self._broken
 
     def close(self) -> None:
         """Write the queued events and complete the file; take at most ten seconds."""

@@ -15,10 +15,18 @@ from tests.unit.runtime.recording.films import BEGAN_S, BORN_NS, PROFILE, film_o
 from urc.model.values import Sample
 from urc.runtime.hub import LogEntry, Traffic
 from urc.runtime.json_messages import as_json
+from urc.runtime.recording import recorder
 from urc.runtime.recording.events import event_of, topic_of
 from urc.runtime.recording.reader import open_recording
+from urc.runtime.recording.recorder import Recorder
 from urc.runtime.recording.shapes import RecordingEncoder, channels
-from urc.runtime.recording.videos import GROUP_UNITS, Group, RecordedUnit, RecordedVideos
+from urc.runtime.recording.videos import (
+    GROUP_UNITS,
+    Group,
+    RecordedUnit,
+    RecordedVideos,
+    recorded_unit,
+)
 from urc.video import VideoUnit, encode_unit, read_unit, with_time
 
 SECONDS = 2
@@ -139,3 +147,30 @@ def test_the_data_of_a_camera_is_recorded_once() -> None:
     encoder = RecordingEncoder(PROFILE.driver, utc_ns)
     assert encoder.messages(Traffic(1.0, "eye", "received", b"\0" * 100)) == []
     assert encoder.messages(LogEntry(1.0, "info", "eye", "text")) != []
+
+
+def test_a_loss_costs_whole_groups_and_never_leaves_images_without_their_keyframe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slow disk: the keyframe is too large for the queue, and the images after it are not."""
+    film = film_of([place / RATE for place in range(4 * GROUP)])
+    file = tmp_path / "bot.mcap"
+    kept = Recorder(file, PROFILE, document="urc: 1\n")
+    with kept._wakes:  # nothing is written meanwhile
+        kept.record(film[:GROUP])
+        key, others = len(film[GROUP].value), [len(one.value) for one in film[GROUP + 1 :]]  # type: ignore[arg-type]
+        assert key > 3 * max(others[: GROUP - 1])
+        monkeypatch.setattr(recorder, "MOST_WAITING_BYTES", kept._waiting_bytes + key)
+        kept.record(film[GROUP : 2 * GROUP + 3])
+        assert len(kept._waiting) == GROUP
+    monkeypatch.undo()
+    kept.record(film[2 * GROUP + 3 :])
+    kept.record(film[GROUP + 2 : GROUP + 4], lost=1)
+    kept.close()
+    units = [
+        unit.data
+        for message in open_recording(file).messages(0)
+        if (unit := recorded_unit(message.data)) is not None
+    ]
+    wanted = [*film[:GROUP], *film[3 * GROUP :]]
+    assert units == [unit_of(one).data for one in wanted]
