@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 import pytest
-from playwright.async_api import Page, expect
+from playwright.async_api import Page, Route, expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import until
@@ -27,6 +27,8 @@ PAD: Final = ".joystick-pad"
 SAME: Final = "Camera repeats the same image"
 COMPARED: Final = PROFILE.replace("stale_after: 2s", "stale_after: 2s, frozen_after: 500ms")
 NO_DECODER: Final = "delete globalThis.VideoDecoder"
+UNREADABLE: Final = "VideoFrame.prototype.copyTo = () => Promise.reject(new Error('opaque'));"
+"""Images of some decoders for hardware cannot be copied, only drawn."""
 LISTEN: Final = """
 () => {
   const age = document.querySelector(".camera-age");
@@ -37,31 +39,46 @@ LISTEN: Final = """
 """
 
 
+class Unreadable:
+    """Serves the script of the decoder for a browser that cannot copy its images."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    async def __call__(self, route: Route) -> None:
+        answer = await route.fetch()
+        await route.fulfill(response=answer, body=UNREADABLE + await answer.text())
+        self.count += 1
+
+
 @asynccontextmanager
 async def projected_cart(
-    new_page: PageMaker, folder: Path, script: str = "", profile: str = COMPARED
+    new_page: PageMaker, folder: Path, kind: str = "", profile: str = COMPARED
 ) -> AsyncIterator[tuple[Cart, Page, Projector]]:
     """Serve a cart behind its guard with a film; give it, its page and the projector."""
-    port = free_port()
+    port, script = free_port(), Unreadable()
     with projecting(port) as projector:
         async with served(folder, profile.replace("EYE", str(port))) as (cart, address):
             page = await fresh(new_page)
-            if script:
-                await page.add_init_script(script)
+            if kind == "no decoder":
+                await page.add_init_script(NO_DECODER)
+            elif kind == "unreadable":
+                await page.route("**/video_worker.js*", script)
             await page.goto(address)
             await page.wait_for_function(
                 "() => document.querySelector('.camera canvas')?.width >= 320"
             )
             await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+            assert script.count == (kind == "unreadable")
             yield cart, page, projector
 
 
-@pytest.mark.parametrize("script", ["", NO_DECODER], ids=["decoder", "no decoder"])
+@pytest.mark.parametrize("kind", ["decoder", "no decoder", "unreadable"])
 async def test_an_encoder_that_repeats_its_picture_stops_the_cart(
-    script: str, new_page: PageMaker, tmp_path: Path
+    kind: str, new_page: PageMaker, tmp_path: Path
 ) -> None:
     """New data arrive all the time. Without a decoder, the server compares the images."""
-    async with projected_cart(new_page, tmp_path, script) as (cart, page, projector):
+    async with projected_cart(new_page, tmp_path, kind) as (cart, page, projector):
         age = page.locator(".camera-age")
         await push_until(lambda: moves(cart), page, PAD)
         await expect(age).not_to_contain_text(SAME)

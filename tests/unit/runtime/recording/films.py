@@ -54,7 +54,7 @@ def utc_ns(time_s: float) -> int:
     return BORN_NS + round(time_s * 1e9)
 
 
-def record(file: Path, events: Sequence[Sample | LogEntry], *, is_whole: bool = True) -> Path:
+def record(file: Path, events: Sequence[Sample | LogEntry]) -> Path:
     """Write events to a recording, whose clock begins at `BORN_NS`; return its path."""
     kept = Recorder(file, PROFILE, document="urc: 1\n")
     while not kept.is_begun:
@@ -63,6 +63,4 @@ def record(file: Path, events: Sequence[Sample | LogEntry], *, is_whole: bool = 
     kept._writer._Writer__chunk_size = 4000
     kept.record(events)
     kept.close()
-    if not is_whole:
-        file.write_bytes(file.read_bytes()[:-2000])
     return file

@@ -194,6 +194,17 @@ def test_a_damaged_recording_gives_what_can_be_read(tmp_path: Path) -> None:
     assert len(images) == film.images
 
 
+def test_a_recording_without_its_end_gives_what_was_written(tmp_path: Path) -> None:
+    """Its process was killed."""
+    file = record(tmp_path / "bot.mcap", film_of(EVEN))
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    film = export_film(open_recording(file), "front", tmp_path / "film.mp4")
+    images, at_s = shown(tmp_path / "film.mp4")
+    assert 0 < film.images < len(EVEN)
+    assert images == decoded("libx264", data_of(film_of(EVEN)[: film.images]))
+    assert at_s == pytest.approx(EVEN[: film.images], abs=1e-4)
+
+
 def test_without_the_package_it_says_how_to_get_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

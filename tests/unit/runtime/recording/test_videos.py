@@ -12,11 +12,13 @@ from mcap.reader import make_reader
 
 from tests.films import GROUP, RATE
 from tests.unit.runtime.recording.films import BEGAN_S, BORN_NS, PROFILE, film_of, record, utc_ns
-from urc.model.values import Sample
+from urc.model.driver import Driver
+from urc.model.values import Sample, Signal
 from urc.runtime.hub import LogEntry, Traffic
 from urc.runtime.json_messages import as_json
 from urc.runtime.recording import recorder
 from urc.runtime.recording.events import event_of, topic_of
+from urc.runtime.recording.player import PlaybackSession
 from urc.runtime.recording.reader import open_recording
 from urc.runtime.recording.recorder import Recorder
 from urc.runtime.recording.shapes import RecordingEncoder, channels
@@ -113,6 +115,17 @@ def test_a_jump_begins_with_the_keyframe_before_the_position(tmp_path: Path) -> 
     assert [json.loads(one.data) for one in found if one.topic == topic_of("battery")] == [
         {"value": position - 1}
     ]
+
+
+def test_a_playback_compares_no_videos() -> None:
+    """A jump shows the same images again, which no camera has repeated."""
+    signals = {
+        "film": Signal("film", "video", frozen_after_s=2.0),
+        "front": Signal("front", "image", frozen_after_s=2.0),
+    }
+    profile = PROFILE._replace(driver=Driver(signals=signals))
+    hub = PlaybackSession(profile, {}).hub
+    assert [one.frozen_after_s for one in hub.signals.values()] == [0.0, 2.0]
 
 
 def test_a_group_without_an_end_is_left_out() -> None:
