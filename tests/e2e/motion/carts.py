@@ -60,7 +60,8 @@ async def served(folder: Path, profile: str) -> AsyncIterator[tuple[Cart, str]]:
     task = asyncio.create_task(serve(app, port=0, on_ready=ready.set_result))
     try:
         async with asyncio.timeout(WAIT_S):
-            yield cart, f"{await ready}robots/cart/"
+            address = await ready
+        yield cart, f"{address}robots/cart/"
     finally:
         task.cancel()
         await asyncio.wait((task,), timeout=WAIT_S)
