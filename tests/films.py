@@ -35,25 +35,28 @@ def film_image(place: int, kind: FilmKind) -> NDArray[np.uint8]:
     return np.repeat(np.clip(grey, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
 
 
-def encoder(codec: str = "libx264", **options: str) -> av.VideoCodecContext:
+def encoder(codec: str = "libx264", *, group: int = GROUP, **options: str) -> av.VideoCodecContext:
     """Return an encoder without delay; `options` replace the defaults."""
     made = av.CodecContext.create(codec, "w")
     assert isinstance(made, av.VideoCodecContext)
     made.width, made.height, made.pix_fmt = WIDTH, HEIGHT, "yuv420p"
     made.time_base, made.framerate = Fraction(1, RATE), Fraction(RATE)
-    made.gop_size = GROUP
+    made.gop_size = group
+    made.thread_count = 1  # the same data on each machine
     more = {"x265-params": "log-level=none"} if codec == "libx265" else {}
     made.options = {"preset": "ultrafast", "tune": "zerolatency", **more, **options}
     return made
 
 
 def pictures(
-    kind: FilmKind, codec: str = "libx264", **options: str
+    kind: FilmKind, codec: str = "libx264", *, group: int = GROUP, **options: str
 ) -> Iterator[tuple[bool, bytes]]:
     """Yield the access units of an endless film, and whether each is a keyframe."""
-    made = encoder(codec, **options)
+    made, image = encoder(codec, group=group, **options), film_image(0, kind)
     for place in count():
-        frame = av.VideoFrame.from_ndarray(film_image(place, kind), "rgb24")
+        if kind != "standing":
+            image = film_image(place, kind)
+        frame = av.VideoFrame.from_ndarray(image, "rgb24")
         frame.pts = place
         for packet in made.encode(frame):
             yield bool(packet.is_keyframe), bytes(packet)
