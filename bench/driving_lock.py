@@ -53,7 +53,7 @@ PIECE_S: Final = 20
 ROUND: Final = 20
 """Number of trials with the same server."""
 ROUND_OF_VIDEOS: Final = {"video": 6, "standing": 3}
-"""Number of trials with the same cart, whose server ends after `WAIT_S` seconds."""
+"""Number of trials with the same cart."""
 MOST_TIMES: Final = 3
 """Maximum number of trials, as a multiple of the required number, if trials are invalid."""
 BOUND_MS: Final = 1000 * MARGIN_S
