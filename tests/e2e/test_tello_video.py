@@ -15,7 +15,7 @@ from tests.e2e.drawn import PIXELS_OF
 from tests.e2e.robots.hands import give
 from tests.e2e.robots.recording import Overheard, alive
 from tests.e2e.test_video_page import kinds_of_frames
-from tests.e2e.transports.test_emulated_camera import encoders, until_encoders
+from tests.e2e.transports.encoders import encoders, until_encoders
 from urc.simulator.servers import camera as emulated_camera
 from urc.transports import camera
 from urc.wire.picture import PICTURE, VIDEO

@@ -14,7 +14,7 @@ __all__ = ["EncodedUnit", "EncoderFault", "VideoEncoder"]
 FIRST_S: Final = 20.0
 """Maximum time for the first image, in seconds; the library loads slowly on small computers."""
 _IMAGE_S: Final = 5.0
-_END_S: Final = 1.0
+_END_S: Final = 5.0
 _MAX_UNIT_BYTES: Final = 8_388_608
 
 
@@ -37,11 +37,6 @@ class VideoEncoder:
     def __init__(self) -> None:
         self._process: asyncio.subprocess.Process | None = None
         self._limit_s = FIRST_S
-
-    @property
-    def is_running(self) -> bool:
-        """Whether the process has started."""
-        return self._process is not None
 
     async def encode(self, image: bytes, *, is_key: bool = False) -> EncodedUnit:
         """Return an image as an access unit.
@@ -70,9 +65,11 @@ class VideoEncoder:
         return EncodedUnit(head == KEYFRAME, content)
 
     async def close(self) -> None:
-        """End the process; the method may be called twice."""
-        process, self._process = self._process, None
-        self._limit_s = FIRST_S
+        """End the process; the method may be called twice.
+
+        After a cancelled call, the next call waits for the end of the process.
+        """
+        process = self._process
         if process is None:
             return
         with suppress(ProcessLookupError):
@@ -82,6 +79,7 @@ class VideoEncoder:
                 await process.wait()
         if process.stdin is not None:
             process.stdin.close()
+        self._process, self._limit_s = None, FIRST_S
 
     async def _started(self) -> asyncio.subprocess.Process:
         # -P: nothing is imported from the current folder. Ctrl-C is meant for the simulator.
