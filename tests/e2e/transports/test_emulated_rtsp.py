@@ -138,7 +138,14 @@ async def test_odd_requests_are_answered_or_refused_and_harm_nobody(tmp_path: Pa
         assert said.count(b"RTSP/1.0 200 OK\r\nCSeq: 7\r\nPublic: OPTIONS, DESCRIBE") == 2
         asked = b"DESCRIBE rtsp://c/stream1 RTSP/1.0\r\nCSeq: 1\r\n\r\n"
         assert (await rtsp_says(port, asked)).startswith(b"RTSP/1.0 401 Unauthorized\r\nCSeq: 1")
-        for bad in (b"GET / HTTP/1.1\r\n\r\n", b"x" * 100_000, b"A: b\r\n" * 5000, b"\0\1\r\n\r\n"):
+        odd = b"DESCRIBE rtsp://[::1/ RTSP/1.0\r\n\r\n"
+        for bad in (
+            b"GET / HTTP/1.1\r\n\r\n",
+            odd,
+            b"x" * 100_000,
+            b"A: b\r\n" * 5000,
+            b"\0\r\n\r\n",
+        ):
             assert (await rtsp_says(port, bad)).startswith(b"RTSP/1.0 400 Bad Request")
         for cut in (b"OPT", b"$\x01\xff\xff", b""):
             assert await rtsp_says(port, cut) == b""

@@ -28,8 +28,9 @@ MAX_WAITING_BYTES: Final = 1_048_576
 """Bytes that may wait for a slow client; then images are dropped up to the next keyframe."""
 REPORT_EVERY_S: Final = 5.0
 _TRACK: Final = "video"
-_CLIENT_PORTS: Final = re.compile(r"client_port=(\d{1,5})-(\d{1,5})")
-_CHANNELS: Final = re.compile(r"interleaved=(\d{1,3})-(\d{1,3})")
+_CLIENT_PORTS: Final = re.compile(r"client_port=([0-9]{1,5})-([0-9]{1,5})")
+_CHANNELS: Final = re.compile(r"interleaved=([0-9]{1,3})-([0-9]{1,3})")
+_LENGTH: Final = re.compile(r"[0-9]{1,5}")
 _METHODS: Final = "OPTIONS, DESCRIBE, SETUP, PLAY, TEARDOWN, GET_PARAMETER"
 _REASONS: Final = {
     200: "OK",
@@ -69,12 +70,15 @@ class RtspServer(UrlServer, StreamServer):
 
 class _Request(NamedTuple):
     method: str
+    """Method in capital letters; "" for an invalid request."""
     target: str
+    """Target as received."""
+    path: str
+    """Decoded path of the target, without a slash at the end."""
     headers: Mapping[str, str]
 
-    @property
-    def path(self) -> str:
-        return unquote(urlsplit(self.target).path).rstrip("/")
+
+_INVALID: Final = _Request("", "", "", {})
 
 
 class _Answer(NamedTuple):
@@ -303,7 +307,7 @@ async def _next(reader: asyncio.StreamReader) -> _Request | None:
         try:
             piece = await reader.readline() if head else await reader.read(1)
         except ValueError:  # a line that exceeds the limit of the reader
-            return _Request("", "", {})
+            return _INVALID
         if not piece:
             return None
         if piece == b"$" and not head:
@@ -313,7 +317,7 @@ async def _next(reader: asyncio.StreamReader) -> _Request | None:
             continue
         head += piece if head else piece.strip()  # lines may be empty between requests
         if len(head) > MAX_HEAD_BYTES:
-            return _Request("", "", {})
+            return _INVALID
     return await _parsed(bytes(head), reader)
 
 
@@ -326,12 +330,12 @@ async def _parsed(head: bytes, reader: asyncio.StreamReader) -> _Request:
         if colon:
             headers[name.strip().lower()] = value.strip()
     length = headers.get("content-length", "0")
-    if (
-        len(words) != 3
-        or not words[2].startswith("RTSP/1.")
-        or not re.fullmatch(r"\d{1,5}", length)
-    ):
-        return _Request("", "", headers)
+    if len(words) != 3 or not words[2].startswith("RTSP/1.") or not _LENGTH.fullmatch(length):
+        return _INVALID
+    try:
+        path = unquote(urlsplit(words[1]).path).rstrip("/")
+    except ValueError:
+        return _INVALID
     with suppress(asyncio.IncompleteReadError):
         await reader.readexactly(int(length))
-    return _Request(words[0].upper(), words[1], headers)
+    return _Request(words[0].upper(), words[1], path, headers)
