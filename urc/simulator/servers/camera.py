@@ -1,7 +1,7 @@
 """An emulated camera that sends H.264, with the images of the robot's world.
 
 With an ``rtsp`` URL, the camera is an RTSP server. With a ``udp`` URL, it sends datagrams to the
-port on which the driver listens. On free ports, a camera with an ``http`` URL sends datagrams too.
+port on which the driver listens. On free ports, a camera with any other URL sends datagrams too.
 
 If the robot has a world, the camera sends video while the world gives its signal an image. A rule
 can therefore start and stop the video with a command. Without a world, the camera always sends an
