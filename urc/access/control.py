@@ -125,13 +125,14 @@ class AccessControl:
     async def watch(self) -> None:
         """Until cancelled, detect changes by other processes and record the use of sign-ins.
 
-        A thread reads the file, because another process may have locked it.
+        A thread reads the file, because another process may have locked it. Waking a thread costs
+        more than looking at the file's time, so this comes first.
         """
         touched_at = self.now()
         while self.store is not None:
             await asyncio.sleep(WATCH_S)
             try:
-                if await asyncio.to_thread(self.store.changed):
+                if self.store.may_have_changed() and await asyncio.to_thread(self.store.changed):
                     await self.reload()
                 if self.now() - touched_at >= TOUCH_S:
                     touched_at = self.now()

@@ -49,6 +49,9 @@ MOST_DEVICES_OF_ONE: Final = 50
 LONGEST_NAME: Final = 64
 _VERSION: Final = 1
 _BUSY_S: Final = 5.0
+CHECKS: Final = 10
+"""Number of checks for which a change of the file's time counts. Two changes within a few
+milliseconds may have the same time, and the second one would be missed."""
 _CREATE: Final = (
     "CREATE TABLE principals ( "
     "id TEXT PRIMARY KEY, kind TEXT NOT NULL, name TEXT NOT NULL, grants TEXT NOT NULL, "
@@ -108,6 +111,9 @@ class AccessStore:
         """
         self.file = folder / FILE
         self._lock = threading.RLock()
+        self._stamp = (0, 0, 0)
+        """Time of the last change, size and number of the file."""
+        self._checks_left = 0
         try:
             make_private(folder)
             if not self.file.exists():
@@ -141,6 +147,22 @@ class AccessStore:
         """Close the file."""
         with self._lock:
             self._base.close()
+
+    def may_have_changed(self) -> bool:
+        """Return whether `changed` should be called, according to the file's time and size.
+
+        The method does not read the file, and never blocks. File times are coarse, so a change
+        counts for several calls.
+        """
+        try:
+            found = self.file.stat()
+        except OSError:
+            return True  # `changed` reports the reason
+        stamp = (found.st_mtime_ns, found.st_size, found.st_ino)
+        if stamp != self._stamp:
+            self._stamp, self._checks_left = stamp, CHECKS
+        self._checks_left -= 1
+        return self._checks_left >= 0
 
     def changed(self) -> bool:
         """Return whether another process has changed the file since the last call."""

@@ -1,5 +1,6 @@
 """The store of people, devices, programs, sign-ins and codes, and the rights that follow."""
 
+import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 from urc.access.directory import NOBODY, Identity
 from urc.access.grants import AccessError, Grant
 from urc.access.store import (
+    CHECKS,
     MOST_CODES_OF_ONE,
     MOST_DEVICES_OF_ONE,
     MOST_SIGN_INS_OF_ONE,
@@ -123,6 +125,19 @@ def test_two_processes_see_each_others_changes(store: AccessStore, tmp_path: Pat
     assert store.changed()
     assert not store.changed()
     assert store.directory().identify(secret, NOW) == NOBODY
+
+
+def test_the_file_is_read_only_after_a_change(store: AccessStore, tmp_path: Path) -> None:
+    """Also a few times later: a second change may have the same time."""
+    os.utime(store.file, (0, 0))
+    first = [store.may_have_changed() for _ in range(CHECKS + 2)]
+    assert first == [True] * CHECKS + [False] * 2
+    other = AccessStore(tmp_path / "data")
+    other.add("person", "Ann", now=NOW)
+    other.close()
+    assert [store.may_have_changed() for _ in range(CHECKS + 1)] == [True] * CHECKS + [False]
+    store.file.unlink()
+    assert store.may_have_changed()
 
 
 @pytest.mark.parametrize(
