@@ -157,6 +157,26 @@ def test_signal_takes_a_raw_value(signal: Signal, raw: object, value: object) ->
     assert build_converter(signal)(raw) == value
 
 
+NUMBERS = st.floats() | st.none() | st.integers() | st.booleans() | st.sampled_from(["1.5", "x"])
+BOUNDS = st.none() | st.floats(allow_nan=False)
+
+
+@given(raw=st.lists(NUMBERS) | st.lists(st.floats(-9, 9) | st.none()), least=BOUNDS, most=BOUNDS)
+def test_an_array_has_the_same_elements_as_single_values(
+    raw: list[object], least: float | None, most: float | None
+) -> None:
+    """Whether all elements are checked together, such as the rays of a scan, or one by one."""
+    convert = build_converter(Signal("s", "number", min=least, max=most))
+    array = build_converter(Signal("s", "array", min=least, max=most))
+    try:
+        elements = tuple(map(convert, raw))
+    except BadValue:
+        with pytest.raises(BadValue):
+            array(raw)
+        return
+    assert array(raw) == elements
+
+
 REFUSED = [
     (Signal("s", max=5), 6, "6 is above its maximum 5"),
     (Signal("s", min=5), "4", "'4' is below its minimum 5"),

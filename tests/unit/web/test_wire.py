@@ -133,12 +133,16 @@ def test_values_of_many_parts() -> None:
         Sample("cells", (3.9, None, 2**60), 1.0),
         Sample("pose", {"x": [1, {"y": b"abc"}], 3: "z"}, 1.0),
         Sample("picture", b"\xff" * 40000, 1.0),
+        Sample("rays", (0.5, None, math.nan, True), 1.0),
+        Sample("words", ("a", "\ud800"), 1.0),
     ]
-    index = {"cells": 0, "pose": 1, "picture": 2}
+    index = {"cells": 0, "pose": 1, "picture": 2, "rays": 3, "words": 4}
     assert json.loads(wire.encode_values(samples, wire.Indexes(index), 1.5))["v"] == [
         [3.9, None, str(2**60)],
         {"x": [1, {"y": {"bytes": 3}}], "3": "z"},
         {"bytes": 40000},
+        [0.5, None, None, True],
+        ["a", "?"],
     ]
 
 

@@ -8,7 +8,7 @@ composite values.
 import re
 from binascii import Error as Base64Error
 from binascii import a2b_base64, b2a_base64
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 from urc.expressions import quoted
@@ -21,6 +21,7 @@ from urc.video import read_unit
 __all__ = [
     "MAX_BYTES",
     "MAX_ELEMENTS",
+    "Elements",
     "array_converter",
     "bytes_converter",
     "bytes_of",
@@ -32,14 +33,21 @@ MAX_ELEMENTS = 65536
 """Maximum number of elements in an array."""
 MAX_BYTES = 1 << 24
 """Maximum size of an image or blob if ``size`` is not declared, in bytes."""
+Elements = list[object] | tuple[object, ...]
 _BETWEEN = re.compile(r"[\s,;]+")
 _AROUND = " \t\r\n[]()"
 
 
 def array_converter(
-    signal: Signal, element: Callable[[object], Value]
+    signal: Signal, element: Callable[[object], Value], are_values: Callable[[Elements], bool]
 ) -> Callable[[object], Reading]:
-    """Return a function that converts raw elements to a tuple, using `element` for each value."""
+    """Return a function that converts raw elements to a tuple.
+
+    Args:
+        signal: the signal.
+        element: function that converts one element.
+        are_values: function that returns whether all elements are values already.
+    """
     wanted = signal.size
 
     def convert(raw: object) -> Reading:
@@ -50,6 +58,8 @@ def array_converter(
             raise BadValue(f"expected {wanted} elements, found {len(items)}")
         if len(items) > MAX_ELEMENTS:
             raise BadValue(f"expected at most {MAX_ELEMENTS} elements, found {len(items)}")
+        if are_values(items):
+            return tuple(cast("Sequence[Value]", items))
         values = []
         for place, item in enumerate(items):
             try:
@@ -61,7 +71,7 @@ def array_converter(
     return convert
 
 
-def elements_of(raw: object) -> list[object] | tuple[object, ...]:
+def elements_of(raw: object) -> Elements:
     """Return the elements of a list, bytes or separated text."""
     if isinstance(raw, (list, tuple)):
         return raw

@@ -192,7 +192,7 @@ def encode_values(
     else:
         ages = [max(0, milliseconds(now_s - time_s)) for time_s in times]
     if not _AS_THEY_ARE.issuperset(map(type, values)):
-        values = tuple(repaired(_plain(value)) for value in values)
+        values = tuple(map(_plain, values))
     are_normal = alarms.count("") == count
     now_ms, numbers = round(now_s * 1000), indexes.of(names)
     told = None if are_normal else alarms
@@ -267,7 +267,7 @@ def encode_error(code: str, message: str) -> str:
 def _plain(value: object) -> object:
     """Return a value that browsers can read: long text is cut, and bytes become their size."""
     if isinstance(value, str):
-        return cut(value)
+        return repaired(cut(value))
     if type(value) is int and not -_EXACT <= value <= _EXACT:
         return str(value)
     if value is None or isinstance(value, (bool, int, float)):
@@ -275,10 +275,11 @@ def _plain(value: object) -> object:
     if isinstance(value, (bytes, bytearray)):
         return {"bytes": len(value)}
     if isinstance(value, Mapping):
-        return {str(name): _plain(item) for name, item in value.items()}
+        return {str(repaired(str(name))): _plain(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    return cut(str(value))
+        are_plain = _AS_THEY_ARE.issuperset(map(type, value))
+        return value if are_plain else [_plain(item) for item in value]
+    return repaired(cut(str(value)))
 
 
 def _signal(signal: Signal, sources: tuple[str, ...], *, is_playback: bool) -> SignalRow:
