@@ -116,6 +116,27 @@ def test_only_frames_of_the_bridge_are_arrivals() -> None:
     assert queue.arrivals == 3
 
 
+def test_the_throttle_delivers_the_newest_message_later() -> None:
+    """The messages in between are dropped."""
+    queue, late = TopicReceiveQueue(), list[Callable[[], None]]()
+    session = FoxgloveSession(
+        queue,
+        (TopicWish("/odom", "", 0.5),),
+        TopicGraph(lambda _: None, 2),
+        call_at=lambda _, work: late.append(work),
+        clock=lambda: 1.0,
+        published={},
+    )
+    hear(session, {"op": "advertise", "channels": [ODOM]})
+    session.reconcile()
+    for body in (b"1", b"2", b"3"):
+        session.arrived(MESSAGE[:-2] + body)
+    assert len(late) == 1
+    late.pop()()
+    assert [asyncio.run(queue.pop()).body for _ in range(3)] == ["", b"1", b"3"]
+    assert not queue.dropped
+
+
 OWN = {"id": 9, "topic": "/odom", "encoding": "cdr", "schemaName": "my_msgs/msg/Own"}
 
 

@@ -278,26 +278,25 @@ class FoxgloveSession:
         if one.is_status:
             self._states.driver_arrived(one.number, one.wish.topic, said.data)
         self._take_time(said.time_ns)
-        attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
-        envelope = Envelope("message", attributes, said.data)
         if self._time.is_simulated and one.wish.topic == CLOCK_TOPIC:
             restarted = self._time.clock(one.channel.encoding, said.data)
             if restarted is not None:
                 self.queue.answer(restarted)
             if self._time.is_clock_only:
                 return
-        throttle_s = one.wish.throttle_s
-        if not throttle_s:
-            self.queue.message(one.wish.topic, envelope, len(said.data))
-            return
-        now_s = self._clock()
-        if now_s < one.due_s:
-            if one.late is None:
-                self._call_at(one.due_s, lambda: self._deliver_late(one))
-            one.late = envelope
-            return
-        one.due_s = now_s + throttle_s
-        self.queue.message(one.wish.topic, envelope, len(said.data))
+        if one.wish.throttle_s:
+            now_s = self._clock()
+            if now_s < one.due_s:
+                if one.late is None:
+                    self._call_at(one.due_s, lambda: self._deliver_late(one))
+                one.late = said.data
+                return
+            one.due_s = now_s + one.wish.throttle_s
+        self._deliver(one, said.data)
+
+    def _deliver(self, one: DrivenChannel, data: bytes) -> None:
+        attributes = {"topic": one.wish.topic, "encoding": one.channel.encoding}
+        self.queue.message(one.wish.topic, Envelope("message", attributes, data), len(data))
 
     def _take_time(self, robot_ns: int) -> None:
         """Record the time of a message from the robot."""
@@ -306,12 +305,10 @@ class FoxgloveSession:
             self.queue.answer(stepped)
 
     def _deliver_late(self, one: DrivenChannel) -> None:
-        envelope, one.late = one.late, None
-        if envelope is None or self._subscriptions.get(one.number) is not one:
-            return
-        one.due_s = self._clock() + one.wish.throttle_s
-        data = envelope.body
-        self.queue.message(one.wish.topic, envelope, len(data) if isinstance(data, bytes) else 0)
+        data, one.late = one.late, None
+        if data is not None and self._subscriptions.get(one.number) is one:
+            one.due_s = self._clock() + one.wish.throttle_s
+            self._deliver(one, data)
 
     # -- services and parameters
 

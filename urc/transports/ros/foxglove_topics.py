@@ -43,7 +43,7 @@ class DrivenChannel:
         self.due_s = float("-inf")
         self.received = 0
         """Number of received messages."""
-        self.late: Envelope | None = None
+        self.late: bytes | None = None
         """Newest message that arrived too soon and must be delivered later, or None."""
 
 
