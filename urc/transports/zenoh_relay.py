@@ -37,16 +37,23 @@ log = logging.getLogger(__name__)
 class ZenohRelay:
     """The relay of one connection."""
 
-    def __init__(self, stream: ByteStream, ended: Callable[[str, bool], None]) -> None:
+    def __init__(
+        self,
+        stream: ByteStream,
+        ended: Callable[[str, bool], None],
+        passed_on: Callable[[], object] = lambda: None,
+    ) -> None:
         """Initialise the relay.
 
         Args:
             stream: the open connection to the router, owned by the relay from now on.
             ended: callback for the end of the connection; it receives the reason, and whether the
                 library ended it.
+            passed_on: callback after the library was sent data from the router.
         """
         self._stream = stream
         self._ended = ended
+        self._passed_on = passed_on
         self._loop = asyncio.get_running_loop()
         self._folder = ""
         self._listener: socket.socket | None = None
@@ -200,5 +207,6 @@ class ZenohRelay:
             data = await self._stream.read()
             self.heard_s = self._loop.time()
             await self._loop.sock_sendall(end, data)
+            self._passed_on()
             if self.is_gathering and len(data) < GATHER_BYTES:
                 await asyncio.sleep(GATHER_S)

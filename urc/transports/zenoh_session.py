@@ -1,7 +1,10 @@
 """One session of the Zenoh library over one open connection.
 
-The library runs in its own threads and calls back from them. Received samples are handed over to
-the event loop in one bounded queue. Calls that may wait run in a thread.
+The library runs in its own threads. Received samples wait in the library until the event loop
+collects them, soon after the relay has passed on data from the router. The library's threads run no
+Python for a sample: they would keep the event loop waiting, because they have a lower priority than
+a guard. For rare events, such as tokens and replies, the library calls back, and hands them over in
+one bounded queue. Calls that may wait run in a thread.
 """
 
 import asyncio
@@ -11,7 +14,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from urllib.parse import quote
 
 import zenoh
@@ -23,15 +26,25 @@ from urc.transports._faults import CLOSED, late, one_line
 from urc.transports.base import ByteStream, ConnectFailed, PeerClosed, TransportError
 from urc.transports.topic_queue import TopicReceiveQueue
 from urc.transports.zenoh_options import KeySubscription, ZenohOptions
-from urc.transports.zenoh_relay import ZenohRelay
+from urc.transports.zenoh_relay import GATHER_S, ZenohRelay
 
-__all__ = ["ZenohSession"]
+__all__ = ["Inbox", "ZenohSession"]
 
 MAX_BYTES: Final = 16 * 1024 * 1024
 """Maximum size of a received value, in bytes."""
 MAX_HANDOVER: Final = 4096
-"""Maximum number of samples between the library's thread and the event loop; above the limit, the
+"""Maximum number of events between the library's thread and the event loop; above the limit, the
+oldest event is dropped."""
+MAX_WAITING: Final = 256
+"""Maximum number of samples of one subscription that wait in the library; above the limit, the
 oldest sample is dropped."""
+COLLECT_S: Final = 0.002
+"""Time that the library usually needs for received data, in seconds."""
+_LINGER_S: Final = 1.0
+"""Time for which samples are collected after received data, in seconds: on a busy machine, the
+library needs longer. Later, the keep-alive messages of the router start the next collection."""
+_TURN: Final = 64
+"""Maximum number of samples of one subscription in one turn of the event loop."""
 MAX_GETS: Final = 64
 """Maximum number of unanswered requests."""
 GET_S: Final = 30.0
@@ -54,6 +67,24 @@ _NOTHING: Final = "@urc/ping"
 """Key of a ping. No token has this key, so the router replies at once and with no data."""
 
 
+class Inbox(NamedTuple):
+    """A subscription whose samples the event loop collects."""
+
+    subscriber: Any
+    take: Callable[[Any], None]
+
+    def collect(self) -> bool:
+        """Process the waiting samples; return whether more may be waiting."""
+        with suppress(zenoh.ZError):  # the connection has ended
+            for _ in range(_TURN):
+                sample = self.subscriber.try_recv()
+                if sample is None:
+                    return False
+                self.take(sample)
+            return True
+        return False
+
+
 class ZenohSession:
     """The session of one connection; it is discarded with the connection."""
 
@@ -62,7 +93,10 @@ class ZenohSession:
         self.queue = TopicReceiveQueue()
         self._options = options
         self._loop = asyncio.get_running_loop()
-        self._relay = ZenohRelay(stream, self._relay_ended)
+        self._relay = ZenohRelay(stream, self._relay_ended, self._collect_soon)
+        self._inboxes: list[Inbox] = []
+        self._collection: asyncio.TimerHandle | None = None
+        self._collects_until_s = 0.0
         self._session: Any = None
         self._declared: list[object] = []
         """The library's subscriptions and tokens, which end when nothing refers to them."""
@@ -159,6 +193,24 @@ class ZenohSession:
         """Keep a subscription or token of the library until the connection ends."""
         self._declared.append(declared)
 
+    def receive(self, declare: Callable[[Any], Any], take: Callable[[Any], None]) -> Inbox:
+        """Subscribe, and pass each sample to `take` on the event loop.
+
+        Args:
+            declare: function that declares the subscriber with a handler of the library.
+            take: function that processes a sample.
+        """
+        inbox = Inbox(declare(zenoh.handlers.RingChannel(MAX_WAITING)), take)
+        self._inboxes.append(inbox)
+        return inbox
+
+    def stop_receiving(self, inbox: Inbox) -> None:
+        """Process the samples that have arrived, and undeclare the subscriber."""
+        inbox.collect()
+        if inbox in self._inboxes:
+            self._inboxes.remove(inbox)
+        inbox.subscriber.undeclare()
+
     def hand_over(self, work: Callable[[], None]) -> None:
         """Run `work` on the event loop; called from the library's threads."""
         self._came.append(work)
@@ -190,6 +242,7 @@ class ZenohSession:
     async def _finish(self, session: Any, cut: Callable[[], Any]) -> None:
         await cut()  # a call of the library that still waits ends now
         self._declared.clear()
+        self._inboxes.clear()
         if session is not None:
             with suppress(zenoh.ZError):
                 await self._loop.run_in_executor(None, session.close)
@@ -265,13 +318,13 @@ class ZenohSession:
         return session
 
     def _subscribe(self, one: KeySubscription) -> None:
-        take = partial(self._sample, one)
-        handler = zenoh.handlers.Callback(take, indirect=False)
         if not one.is_liveliness:
-            remote = zenoh.Locality.REMOTE
-            subscriber = self._session.declare_subscriber(one.topic, handler, allowed_origin=remote)
-            self._declared.append(subscriber)
+            declare = partial(
+                self._session.declare_subscriber, one.topic, allowed_origin=zenoh.Locality.REMOTE
+            )
+            self.receive(declare, self._sample)
             return
+        handler = zenoh.handlers.Callback(partial(self._token, one.topic), indirect=False)
         liveliness = self._session.liveliness()
         self._declared.append(liveliness.declare_subscriber(one.topic, handler, history=True))
         if not is_key_expression(one.topic):  # an absent token causes no sample
@@ -282,28 +335,55 @@ class ZenohSession:
     def _absent(self, key: str) -> None:
         """Report a missing token after the list of tokens, unless its subscriber has seen it."""
         if key not in self._tokens:
-            self._hand_over(key, _GONE, True)
+            self._hand_over(key, _GONE)
 
-    def _sample(self, one: KeySubscription, sample: Any) -> None:
-        is_put = sample.kind == zenoh.SampleKind.PUT
+    def _token(self, topic: str, sample: Any) -> None:
         key = str(sample.key_expr)
         if len(key.encode()) > MAX_KEY_BYTES:
             return
-        if one.is_liveliness:
-            if one.topic == key:
-                self._tokens.add(key)
-            self._hand_over(key, _ALIVE if is_put else _GONE, True)
-        elif is_put:  # a deletion has no value
-            self._hand_over(key, sample.payload.to_bytes(), False)
+        if topic == key:
+            self._tokens.add(key)
+        self._hand_over(key, _ALIVE if sample.kind == zenoh.SampleKind.PUT else _GONE)
 
-    def _hand_over(self, key: str, body: bytes, is_liveliness: bool) -> None:
-        attributes = {"topic": key, "liveliness": True} if is_liveliness else {"topic": key}
-        envelope = Envelope("message", attributes, body)
-        self.hand_over(partial(self._value, key, envelope, len(key) + len(body)))
+    def _hand_over(self, key: str, body: bytes) -> None:
+        self.hand_over(partial(self._message, {"topic": key, "liveliness": True}, body))
 
-    def _value(self, key: str, envelope: Envelope, size_bytes: int) -> None:
+    # -- the event loop
+
+    def _sample(self, sample: Any) -> None:
+        key = str(sample.key_expr)
+        is_put = sample.kind == zenoh.SampleKind.PUT  # a deletion has no value
+        if is_put and len(key.encode()) <= MAX_KEY_BYTES:
+            self._message({"topic": key}, sample.payload.to_bytes())
+
+    def _message(self, attributes: dict[str, object], body: bytes) -> None:
         self.queue.note_arrival()
-        self.queue.message(key, envelope, size_bytes)
+        key = str(attributes["topic"])
+        self.queue.message(key, Envelope("message", attributes, body), len(key) + len(body))
+
+    def _collect_soon(self) -> None:
+        """Collect samples after the time that the library needs for received data."""
+        now_s = self._loop.time()
+        self._collects_until_s = now_s + _LINGER_S
+        if self._collection is None or self._collection.when() > now_s + COLLECT_S:
+            self._collect_in(COLLECT_S)
+
+    def _collect_in(self, wait_s: float) -> None:
+        if self._collection is not None:
+            self._collection.cancel()
+        self._collection = self._loop.call_later(wait_s, self._collect)
+
+    def _collect(self) -> None:
+        self._collection = None
+        if self._session is None:
+            return
+        is_more = False
+        for inbox in tuple(self._inboxes):
+            is_more |= inbox.collect()
+        if is_more:
+            self._collect_in(0)
+        elif self._loop.time() < self._collects_until_s:
+            self._collect_in(GATHER_S)
 
     def _arrived(self) -> None:
         self._is_woken = False
@@ -330,6 +410,8 @@ class ZenohSession:
         self.queue.end(reason)
         if self._check is not None:
             self._check.cancel()
+        if self._collection is not None:
+            self._collection.cancel()
         self._ponged()
         self._gets.clear()
 

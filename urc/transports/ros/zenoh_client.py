@@ -45,7 +45,7 @@ from urc.transports.ros.zenoh_names import (
 )
 from urc.transports.ros.zenoh_options import Ros2Options, Ros2Topic
 from urc.transports.ros.zenoh_topics import answer_from
-from urc.transports.zenoh_session import MAX_KEY_BYTES, ZenohSession
+from urc.transports.zenoh_session import MAX_KEY_BYTES, Inbox, ZenohSession
 
 __all__ = ["RosZenohTransport"]
 
@@ -75,12 +75,12 @@ class _Subscription:
 
     def __init__(self, topic: Ros2Topic) -> None:
         self.topic = topic
-        self.declared: Any = None
+        self.inbox: Inbox | None = None
         self.is_transient = False
         self.types: dict[tuple[str, str], None] = {}
         self.type: tuple[str, str] | None = None
         self.due_s = float("-inf")
-        self.late: tuple[tuple[str, str], bytes] | None = None
+        self.late: tuple[tuple[str, str], Any] | None = None
         """Newest message that arrived too soon."""
         self.received = 0
 
@@ -256,15 +256,15 @@ class _RosNode:
 
     def _subscribe(self, one: _Subscription) -> None:
         keys = topic_keys(self._options.domain, one.topic.topic)
-        handler = zenoh.handlers.Callback(partial(self._sample_came, one), indirect=False)
         if one.is_transient:
             history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=_KEPT)
-            one.declared = zenoh.ext.declare_advanced_subscriber(
-                self._library, keys, handler, history=history
+            declare = partial(
+                zenoh.ext.declare_advanced_subscriber, self._library, keys, history=history
             )
         else:
             remote = zenoh.Locality.REMOTE
-            one.declared = self._library.declare_subscriber(keys, handler, allowed_origin=remote)
+            declare = partial(self._library.declare_subscriber, keys, allowed_origin=remote)
+        one.inbox = self.session.receive(declare, partial(self._sample, one))
 
     def pause(self, topic: str, *, is_paused: bool) -> None:
         """Undeclare a subscription while the driver does not need its topic, or declare it again.
@@ -272,37 +272,29 @@ class _RosNode:
         The token remains, so the node's place in the robot's graph does not change.
         """
         one = self._subscriptions.get(f"/{topic.strip('/')}")
-        if one is None or (one.declared is None) == is_paused:
+        if one is None or (one.inbox is None) == is_paused:
             return
-        if is_paused:
-            one.declared.undeclare()
-            one.declared = None
-        else:
+        if one.inbox is None:
             self._subscribe(one)
+        else:
+            inbox, one.inbox = one.inbox, None
+            self.session.stop_receiving(inbox)
 
-    def _sample_came(self, one: _Subscription, sample: Any) -> None:
-        """Hand a message over to the event loop; called from the library's threads."""
-        if sample.kind == zenoh.SampleKind.PUT:
-            told = None if sample.attachment is None else sample.attachment.to_bytes()
-            kind = type_of_key(str(sample.key_expr))
-            self.session.hand_over(
-                partial(self._message, one, kind, sample.payload.to_bytes(), told)
-            )
-
-    def _message(
-        self, one: _Subscription, kind: tuple[str, str], data: bytes, told: bytes | None
-    ) -> None:
+    def _sample(self, one: _Subscription, sample: Any) -> None:
+        if sample.kind != zenoh.SampleKind.PUT:
+            return
         self.session.queue.note_arrival()
-        sent_ns = source_time(told)
+        sent_ns = source_time(None if sample.attachment is None else sample.attachment.to_bytes())
         if sent_ns is not None:
             stepped = self._time.told(sent_ns, time.time_ns())
             if stepped is not None:
                 self.session.queue.answer(stepped)
+        kind = type_of_key(str(sample.key_expr))
         if not self._is_wanted(one, kind):
             return
         one.received += 1
         if self._time.is_simulated and one.topic.topic == CLOCK_TOPIC:
-            restarted = self._time.clock("cdr", data)
+            restarted = self._time.clock("cdr", sample.payload.to_bytes())
             if restarted is not None:
                 self.session.queue.answer(restarted)
             if self._time.is_clock_only:
@@ -311,10 +303,10 @@ class _RosNode:
         if one.topic.throttle_s and now_s < one.due_s:
             if one.late is None:
                 self._timers.append(self._loop.call_at(one.due_s, self._deliver_late, one))
-            one.late = kind, data
+            one.late = kind, sample
             return
         one.due_s = now_s + one.topic.throttle_s
-        self._deliver(one, kind, data)
+        self._deliver(one, kind, sample)
 
     def _is_wanted(self, one: _Subscription, kind: tuple[str, str]) -> bool:
         """Return whether a message has the topic's declared type, or any type if undeclared."""
@@ -325,8 +317,8 @@ class _RosNode:
             one.types[kind] = None
         return kind in one.types
 
-    def _deliver(self, one: _Subscription, kind: tuple[str, str], data: bytes) -> None:
-        topic = one.topic.topic
+    def _deliver(self, one: _Subscription, kind: tuple[str, str], sample: Any) -> None:
+        topic, data = one.topic.topic, sample.payload.to_bytes()
         if kind != one.type:
             one.type = kind
             said = {"topic": topic, "type": kind[0], "encoding": "cdr", "notation": "known"}
@@ -361,11 +353,11 @@ class _RosNode:
         if one is None or found.kind != "publisher" or not found.is_transient or one.is_transient:
             return
         one.is_transient = True
-        before, one.declared = one.declared, None
+        before = one.inbox
         with suppress(zenoh.ZError, TransportError):  # the connection has ended
             if before is not None:  # otherwise, it is paused
                 self._subscribe(one)
-                before.undeclare()
+                self.session.stop_receiving(before)
 
     def _check_topics(self) -> None:
         self._learn()
