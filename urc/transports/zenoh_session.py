@@ -95,7 +95,8 @@ class ZenohSession:
         self._loop = asyncio.get_running_loop()
         self._relay = ZenohRelay(stream, self._relay_ended, self._collect_soon)
         self._inboxes: list[Inbox] = []
-        self._collection: asyncio.TimerHandle | None = None
+        self._collection: asyncio.Handle | None = None
+        self._collects_at_s = 0.0
         self._collects_until_s = 0.0
         self._session: Any = None
         self._declared: list[object] = []
@@ -365,12 +366,13 @@ class ZenohSession:
         """Collect samples after the time that the library needs for received data."""
         now_s = self._loop.time()
         self._collects_until_s = now_s + _LINGER_S
-        if self._collection is None or self._collection.when() > now_s + COLLECT_S:
+        if self._collection is None or self._collects_at_s > now_s + COLLECT_S:
             self._collect_in(COLLECT_S)
 
     def _collect_in(self, wait_s: float) -> None:
         if self._collection is not None:
             self._collection.cancel()
+        self._collects_at_s = self._loop.time() + wait_s
         self._collection = self._loop.call_later(wait_s, self._collect)
 
     def _collect(self) -> None:

@@ -1,10 +1,16 @@
 """Samples of a Zenoh subscription are collected on the event loop, in bounded turns."""
 
+import asyncio
 from collections import deque
+from typing import Any
 
+import pytest
 import zenoh
 
-from urc.transports.zenoh_session import Inbox
+from urc.transports.zenoh_options import ZenohOptions
+from urc.transports.zenoh_session import Inbox, ZenohSession
+
+uvloop = pytest.importorskip("uvloop")
 
 
 class Subscriber:
@@ -38,3 +44,21 @@ def test_the_end_of_the_connection_ends_the_collection() -> None:
     subscriber.is_over = True
     assert not Inbox(subscriber, taken.append).collect()
     assert not taken
+
+
+async def flooded() -> list[int]:
+    """Return what a session receives in several turns, while more data arrives."""
+    stream: Any = None
+    session, taken = ZenohSession(ZenohOptions("127.0.0.1", 7447), stream), list[int]()
+    session._session = object()
+    session.receive(lambda handler: Subscriber(100), taken.append)
+    session._collect()
+    assert len(taken) < 100
+    session._collect_soon()
+    for _ in range(10):
+        await asyncio.sleep(0)
+    return taken
+
+
+def test_more_data_does_not_end_the_collection_of_a_flood() -> None:
+    assert asyncio.Runner(loop_factory=uvloop.new_event_loop).run(flooded()) == list(range(100))

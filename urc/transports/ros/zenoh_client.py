@@ -82,6 +82,8 @@ class _Subscription:
         self.due_s = float("-inf")
         self.late: tuple[tuple[str, str], Any] | None = None
         """Newest message that arrived too soon."""
+        self.timer: asyncio.TimerHandle | None = None
+        """Timer that delivers this message."""
         self.received = 0
 
 
@@ -243,7 +245,8 @@ class _RosNode:
 
     def end(self) -> None:
         """Cancel the timers."""
-        for timer in self._timers:
+        late = [one.timer for one in self._subscriptions.values() if one.timer is not None]
+        for timer in (*self._timers, *late):
             timer.cancel()
 
     def _hash(self, own: str) -> str:
@@ -302,7 +305,7 @@ class _RosNode:
         now_s = self._loop.time()
         if one.topic.throttle_s and now_s < one.due_s:
             if one.late is None:
-                self._timers.append(self._loop.call_at(one.due_s, self._deliver_late, one))
+                one.timer = self._loop.call_at(one.due_s, self._deliver_late, one)
             one.late = kind, sample
             return
         one.due_s = now_s + one.topic.throttle_s
@@ -328,7 +331,6 @@ class _RosNode:
 
     def _deliver_late(self, one: _Subscription) -> None:
         waiting, one.late = one.late, None
-        self._timers = [timer for timer in self._timers if not _is_over(timer, self._loop)]
         if waiting is not None:
             one.due_s = self._loop.time() + one.topic.throttle_s
             self._deliver(one, *waiting)
@@ -452,7 +454,3 @@ class _RosNode:
         topics, self._fresh = list(self._fresh), {}
         lost = [topic for topic in topics if not self._listeners(topic)]
         return f"nothing subscribes to {', '.join(lost)}" if lost else ""
-
-
-def _is_over(timer: asyncio.TimerHandle, loop: asyncio.AbstractEventLoop) -> bool:
-    return timer.cancelled() or timer.when() <= loop.time()
