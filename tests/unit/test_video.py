@@ -31,6 +31,8 @@ def encoded(codec: str, width: int, height: int, count: int = 4, **options: str)
         packets = []
         for _ in range(count):
             frame = av.VideoFrame(width, height, "yuv420p")
+            for plane in frame.planes:  # otherwise, uninitialised memory
+                plane.update(bytes([128]) * plane.buffer_size)
             packets += stream.encode(frame)
         packets += stream.encode(None)
         return [bytes(packet) for packet in packets]
