@@ -196,9 +196,9 @@ async def test_an_encoder_that_dies_is_replaced_and_delays_no_answer(
                 while encoders() in ([], [before]):
                     assert await one.ask("battery?")
                     await asyncio.sleep(0.05)
-        assert [entry.getMessage() for entry in caplog.records] == [
-            "transport camera: the process that encodes the video has failed"
-        ]
+        # asyncio may also tell that the system forgot the process meanwhile (CPython issue 87744).
+        told_by_us = [one.getMessage() for one in caplog.records if one.name.startswith("urc.")]
+        assert told_by_us == ["transport camera: the process that encodes the video has failed"]
         with suppress(BlockingIOError):
             while listener.recv(65_536):
                 pass
