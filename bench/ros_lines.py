@@ -5,7 +5,9 @@ page in Chromium shows all of them at full rate, or all except the cameras. The 
 in turn. The processor time is that of ``urc serve`` with its guard; the robot's does not count.
 
 On each line, a minimal program without engine and page (`bench.peers.ros_reader`) receives the same
-messages. Its processor time shows which part of URC's time belongs to the line and its library.
+messages. Its processor time shows which part of URC's time belongs to the line and its library. A
+server without a line (`bench.rig.memory_process`) gets the same messages from memory. Its processor
+time is the part that all lines share. The sum of both is about the least that a line can need.
 """
 
 import asyncio
@@ -38,6 +40,8 @@ PERIOD_MS = 20.0
 JSON, CBOR, FOXGLOVE, ZENOH = "rosbridge", "rosbridge with CBOR", "foxglove", "zenoh"
 LINES = {JSON: "rosbridge", CBOR: "rosbridge", FOXGLOVE: "foxglove", ZENOH: "zenoh"}
 MINIMAL = {f"{line}, minimal program": line for line in (JSON, FOXGLOVE, ZENOH)}
+MEMORY = "memory"
+"""The server without a line."""
 VALUES, PICTURES = ("odom", "imu", "scan"), ("front", "rear")
 """Topics that the page shows without and with the cameras."""
 READY_S = 40.0
@@ -148,16 +152,25 @@ async def _round(folder: Path, look_s: float) -> dict[str, Costs]:
         for what, of_lines in costs.items():
             with Program([sys.executable, "-m", "bench.peers.ros_streams", via]) as robot:
                 port = int(robot.wait_for("ready", READY_S)[1])
-                work = folder / f"{line}-{what}".replace(" ", "-")
-                work.mkdir()
-                file = work / "bench.yaml"
-                file.write_text(_profile(line, port, with_cameras=what == "cameras"), "utf-8")
-                with Server([file], work / "data") as server:
+                file = _document(folder / f"{line}-{what}".replace(" ", "-"), line, port, what)
+                with Server([file], file.parent / "data") as server:
                     of_lines[line] = await _cost(robot, server, what, look_s)
+    for what, of_lines in costs.items():
+        file = _document(folder / f"memory-{what}", JSON, 1, what)
+        with Server([file], file.parent / "data", module="bench.rig.memory_process") as server:
+            of_lines[MEMORY] = await _cost(None, server, what, look_s)
     for name, line in MINIMAL.items():
         for what, of_lines in costs.items():
             of_lines[name] = await _least(line, what, look_s)
     return costs
+
+
+def _document(work: Path, line: str, port: int, what: str) -> Path:
+    """Write the profile for a line into a new folder; return its path."""
+    work.mkdir()
+    file = work / "bench.yaml"
+    file.write_text(_profile(line, port, with_cameras=what == "cameras"), "utf-8")
+    return file
 
 
 async def _least(line: str, what: str, look_s: float) -> dict[str, float]:
@@ -189,7 +202,9 @@ def _profile(line: str, port: int, *, with_cameras: bool) -> str:
     )
 
 
-async def _cost(robot: Program, server: Server, what: str, look_s: float) -> dict[str, float]:
+async def _cost(
+    robot: Program | None, server: Server, what: str, look_s: float
+) -> dict[str, float]:
     """Return the figures of one line while a page looks."""
     address = f"http://127.0.0.1:{server.port}/robots/bench/?key={server.key}"
     async with (
@@ -218,8 +233,10 @@ async def _images(page: Page) -> int:
     return int(await page.evaluate("() => window.benchImages"))
 
 
-def _bytes(robot: Program) -> int:
-    """Return the number of bytes that the robot has sent to its client."""
+def _bytes(robot: Program | None) -> int:
+    """Return the number of bytes that the robot has sent to its client; 0 without a robot."""
+    if robot is None:
+        return 0
     after = len(robot.lines)
     robot.order("")
     return int(robot.wait_for("bytes", after=after)[1])
@@ -228,7 +245,7 @@ def _bytes(robot: Program) -> int:
 def _figures(rows: Sequence[dict[str, Any]], what: str) -> list[Result]:
     """Print the medians of all rounds; return the results that have goals."""
     of_rows: list[Costs] = [row[what] for row in rows]
-    for line in (*LINES, *MINIMAL):
+    for line in (*LINES, MEMORY, *MINIMAL):
         middle = {
             name: statistics.median(costs[line][name] for costs in of_rows)
             for name in of_rows[0][line]
@@ -236,6 +253,12 @@ def _figures(rows: Sequence[dict[str, Any]], what: str) -> list[Result]:
         shown = {name: round(value, 3) for name, value in middle.items() if name != "bytes"}
         told = {"figure": "ros_lines", "shown": what, "line": line, **shown}
         tell({**told, "kB a second": round(middle["bytes"] / 1000)})
+    for line in (JSON, FOXGLOVE, ZENOH):
+        ratios = [(_core(row, line), _core(row, MEMORY, f"{line}, minimal program"))
+                  for row in of_rows]  # fmt: skip
+        urc, least = (round(statistics.median(column), 2) for column in zip(*ratios, strict=True))
+        told = {"figure": "ros_lines_least", "shown": what, "line": line}
+        tell({**told, "URC": urc, "shared part and minimal program": least})
     results = []
     most = BYTES_WITH_CAMERAS if what == "cameras" else BYTES_WITHOUT
     for line in (FOXGLOVE, ZENOH):
@@ -246,6 +269,11 @@ def _figures(rows: Sequence[dict[str, Any]], what: str) -> list[Result]:
             _limit(of_rows, what, line, "p95_ms", PERIOD_MS),
         ]
     return results
+
+
+def _core(row: Costs, *names: str) -> float:
+    """Return the sum of some processor times as a ratio to rosbridge with JSON."""
+    return sum(row[name]["core"] for name in names) / row[JSON]["core"]
 
 
 def _ratio(

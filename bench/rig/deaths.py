@@ -96,8 +96,8 @@ class Trial(NamedTuple):
 class Rig:
     """A rig with robots, a real server, pages that vanish, and optionally a relay."""
 
-    can_hang = False
-    """Whether a signal can block the server; see `bench.rig.programs.Server`."""
+    module = "urc.cli.main"
+    """Program that runs the server; see `bench.rig.programs.Server`."""
 
     def __init__(
         self,
@@ -134,7 +134,7 @@ class Rig:
                 file.write_text(text, "utf-8")
             self._serve = partial(
                 Server, files, folder / "data", *options, host=self.host, inside=(*there, *inside),
-                can_hang=self.can_hang,
+                module=self.module,
             )  # fmt: skip
             self.server = enter(self._serve())
             self.operators = enter(Operators(inside=here))

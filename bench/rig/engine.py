@@ -20,7 +20,7 @@ BLOCKED_S = 30.0
 class EngineRig(Rig):
     """A rig for driving robots while their server fails."""
 
-    can_hang = True
+    module = "bench.rig.server_process"
 
     def engine_bout(self, death: str) -> list[Trial]:
         """Drive every robot, then freeze, kill or block the server; return the results."""

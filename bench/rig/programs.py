@@ -333,7 +333,7 @@ class Server(Program):
         *options: str,
         host: str = "127.0.0.1",
         inside: Sequence[str] = (),
-        can_hang: bool = False,
+        module: str = "urc.cli.main",
     ) -> None:
         """Start the server, and wait until it listens.
 
@@ -343,10 +343,9 @@ class Server(Program):
             options: additional options for ``urc serve``.
             host: address to listen on.
             inside: command prefix for a network namespace, from `Relay.inside`.
-            can_hang: whether a signal can block the server; see `bench.rig.server_process`.
+            module: program that runs ``urc``, such as `bench.rig.server_process`.
         """
-        script = ["-P", str(HERE / "server_process.py")] if can_hang else ["-m", "urc.cli.main"]
-        command = [sys.executable, *script, "serve", *map(str, profiles)]
+        command = [sys.executable, "-m", module, "serve", *map(str, profiles)]
         command += ["--host", host, "--port", "0", "--data-dir", str(data), *options]
         if host != "127.0.0.1":
             command.append("--insecure-plain-http")  # the operators use plain sockets

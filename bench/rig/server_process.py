@@ -1,8 +1,8 @@
 """A real ``urc serve`` that a signal can block: a separate program.
 
-``python server_process.py serve …`` starts the server. On SIGUSR2, the main thread matches a
-pattern that takes twice as long for each additional letter. The interpreter is blocked during the
-match. The program then prints::
+``python -m bench.rig.server_process serve …`` starts the server. On SIGUSR2, the main thread
+matches a pattern that takes twice as long for each additional letter. The interpreter is blocked
+during the match. The program then prints::
 
     backtracked TIME TIME   from when to when, monotonic nanoseconds
 """
