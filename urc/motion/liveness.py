@@ -8,7 +8,7 @@ time until each reply.
 from math import inf
 from typing import Final
 
-__all__ = ["ASKED_EVERY_S", "SILENCE_S", "Liveness"]
+__all__ = ["ASKED_EVERY_S", "GATHERED_S", "SILENCE_S", "Liveness"]
 
 SILENCE_S: Final = 0.5
 """How long a probed program can be silent before it counts as frozen, in seconds."""
@@ -16,6 +16,9 @@ ASKED_EVERY_S: Final = 0.05
 """Interval between a reply and the next probe, in seconds."""
 _ON_THE_WAY_S: Final = 0.03
 """Time allowed for delivering a reply, or for a reset if no reply arrives, in seconds."""
+GATHERED_S: Final = 2 / 60
+"""Longest time for which a transport gathers received data before it delivers them, in seconds. The
+last data from before a freeze then seem to be from after its beginning."""
 
 
 class Liveness:
@@ -42,7 +45,7 @@ class Liveness:
     def deadline(self) -> float:
         """Time at which the program counts as frozen, unless bytes arrive earlier."""
         asked_s = inf if self._asked_s is None else self._asked_s
-        answer_s = SILENCE_S - ASKED_EVERY_S - _ON_THE_WAY_S
+        answer_s = SILENCE_S - ASKED_EVERY_S - _ON_THE_WAY_S - GATHERED_S
         return min(self._heard_s + self._silent_s, asked_s + answer_s)
 
     def note_arrival(self, now: float) -> None:

@@ -2,7 +2,7 @@
 
 from math import inf
 
-from urc.motion.liveness import ASKED_EVERY_S, SILENCE_S, Liveness
+from urc.motion.liveness import ASKED_EVERY_S, GATHERED_S, SILENCE_S, Liveness
 
 
 def test_unanswered_question_is_waited_for_within_half_a_second_of_the_last_sign() -> None:
@@ -33,3 +33,11 @@ def test_question_stands_until_something_comes() -> None:
     assert liveness.is_asked
     liveness.note_arrival(10.1)
     assert not liveness.is_asked
+
+
+def test_gathered_data_from_before_a_freeze_do_not_prolong_the_silence() -> None:
+    """Delivered late, they look like a sign of life; the next probe follows an interval later."""
+    liveness, frozen_s = Liveness(None), 10.0
+    liveness.note_arrival(frozen_s + GATHERED_S)
+    liveness.asked(frozen_s + GATHERED_S + ASKED_EVERY_S)
+    assert liveness.deadline < frozen_s + SILENCE_S - 0.025, "and the reset needs time, too"
