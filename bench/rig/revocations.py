@@ -7,6 +7,7 @@ while the pages continue to send ticks.
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from functools import partial
 from http.client import HTTPConnection
 from pathlib import Path
@@ -42,7 +43,7 @@ class RevocationRig(Rig):
     def __init__(self, folder: Path, *, robot_count: int = 20) -> None:
         """Start all programs; `folder` also contains the server's data."""
         super().__init__(folder, robot_count=robot_count)
-        self._store = AccessStore(folder / "data")
+        self._store = self._programs.enter_context(closing(AccessStore(folder / "data")))
         self._count = 0
 
     def bout(self, death: str) -> list[Trial]:
