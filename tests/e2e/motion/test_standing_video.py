@@ -122,5 +122,6 @@ async def test_a_standing_picture_counts_as_new_without_the_key(
         await push_until(lambda: moves(cart), page, PAD)
         await asyncio.sleep(PUSH_S)
         await expect(page.locator(".camera-age")).not_to_contain_text(SAME)
-        assert moves(cart)
+        await page.mouse.up()
+        await push_until(lambda: moves(cart), page, PAD)
         await page.mouse.up()
