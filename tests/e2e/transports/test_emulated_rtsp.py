@@ -121,7 +121,7 @@ async def test_urc_reads_rtsp_with_its_time_of_capture(rtp: str, tmp_path: Path)
 async def rtsp_says(port: int, *requests: bytes) -> bytes:
     """Send bytes to the camera; return all that it says until it or the client closes."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
-    writer.writelines(requests)
+    writer.write(b"".join(requests))
     writer.write_eof()
     async with asyncio.timeout(WAIT_S):
         said = await reader.read()
