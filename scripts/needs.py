@@ -21,6 +21,7 @@ APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
 AXE = Path(__file__).resolve().parents[1] / "node_modules" / "axe-core" / "axe.min.js"
 ROSMSG = Path(__file__).resolve().parents[1] / "node_modules" / "@foxglove"
+ONVIF = Path(__file__).resolve().parents[1] / "node_modules" / "onvif"
 WS_PROTOCOL = ROSMSG / "ws-protocol"
 PUPPETEER = Path(__file__).resolve().parents[1] / "node_modules" / "puppeteer-core"
 PYODIDE = Path(__file__).resolve().parents[1] / "node_modules" / "pyodide"
@@ -294,6 +295,13 @@ NEEDS = (
         package="",
         purpose="tests of ROS messages against Foxglove's message reader",
         other=lambda: os.fspath(ROSMSG) if ROSMSG.is_dir() else None,
+    ),
+    Need(
+        name="onvif",
+        executables=(),
+        package="",
+        purpose="tests of the ONVIF profile against another client",
+        other=lambda: os.fspath(ONVIF) if ONVIF.is_dir() else None,
     ),
     Need(
         name="ws-protocol",

@@ -1,4 +1,4 @@
-"""`urc discover`: find announced robots, serial ports and ROS topics."""
+"""`urc discover`: find announced robots, serial ports, cameras and ROS topics."""
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,6 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--for", dest="seconds", type=duration, default=DEFAULT_S, metavar="TIME",
         help="time to listen for announcements (default: 3s)",
     )  # fmt: skip
+    parser.add_argument(
+        "--cameras", action="store_true", help="also search for ONVIF cameras on all networks"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON line per result")
 
 
@@ -74,6 +77,8 @@ async def _look_around(
     if settings is None or "serial" in lines:
         rows += _serial()
     rows += await _mdns(profiles, arguments.seconds)
+    if arguments.cameras:
+        rows += await _cameras(arguments.seconds)
     hint = ""
     if settings is not None and "ros" in lines:
         topics, hint = await _topics(profiles[0], settings)
@@ -127,6 +132,21 @@ async def _mdns(profiles: Sequence["Profile"], seconds: float) -> list[Row]:
         {"found": "mdns", "place": f"{one.host}:{one.port}", "what": f"{one.name} ({one.type})",
          "host": one.host, "port": one.port, "type": one.type, "name": one.name}
         for one in services
+    ]  # fmt: skip
+
+
+async def _cameras(seconds: float) -> list[Row]:
+    from urc.transports.discover_onvif import cameras
+
+    try:
+        found = await cameras(seconds)
+    except OSError as fault:
+        complain(f"urc discover: the search for cameras is not available ({fault})")
+        return []
+    return [
+        {"found": "camera", "place": f"{one.host}:{one.port}", "what": f"{one.name} ({one.path})",
+         "host": one.host, "port": one.port, "path": one.path, "name": one.name}
+        for one in found
     ]  # fmt: skip
 
 
