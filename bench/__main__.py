@@ -53,9 +53,11 @@ NAMES = (
     "motion_input",
     "motion_loss",
     "driving_lock",
+    "video_age",
 )
 
 PROGRAMS = {
+    "video_age": ("chromium", "rtsp-server"),
     "browser_peers": ("chromium",),
     "browser_widgets": ("chromium",),
     "browser_roslibjs": ("chromium", "roslib"),
