@@ -1,4 +1,4 @@
-"""Age of a camera's images, from the camera to the canvas, beside a minimal page.
+"""Age of a camera's images, from the camera to the canvas, compared with a minimal page.
 
 GStreamer's RTSP server films 640 × 480 pixels, 30 a second, with the time in each image
 (`bench.rig.stamped_camera`). URC's page and a minimal page (`bench.rig.plain_video`) show the same

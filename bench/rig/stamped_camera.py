@@ -3,9 +3,9 @@
     python3 stamped_camera.py PORT
 
 The path is /cam. For Debian's Python, because `gi` is not in the registry. The images have
-640 × 480 pixels, 30 a second. The first row has 20 blocks of 32 × 32 pixels, black for 0 and white
-for 1: the machine's monotonic clock in milliseconds, modulo 2 ** 20, lowest bit first. The last
-row repeats it, so that the ends of the access units differ. Between them, a bar moves.
+640 × 480 pixels, 30 a second. The first row contains the machine's monotonic clock in milliseconds,
+modulo 2 ** 20. It has 20 blocks of 32 × 32 pixels, black for 0 and white for 1, lowest bit first.
+The last row repeats it, so that the ends of the access units differ. Between them, a bar moves.
 """
 
 import sys
