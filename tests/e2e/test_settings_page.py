@@ -3,14 +3,19 @@
 from pathlib import Path
 
 import pytest
-from playwright.async_api import Locator, Page, expect
+from playwright.async_api import Dialog, Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
+from tests.e2e.dashboards import until
 from tests.e2e.managing import emulated_rover, running_managed
 from tests.e2e.test_languages import CUT
+from tests.unit.packages.made import DOCUMENTS, install, package
+from urc.packages.store import Store
 from urc.runtime.open_profile import open_document
 
 pytestmark = pytest.mark.anyio
+
+FIELDS = ("host", "pace", "baud")
 
 ROVER = """\
 urc: 1
@@ -152,3 +157,66 @@ async def test_a_group_with_a_missing_setting_is_open_and_the_setting_is_named(
         await page.get_by_role("button", name="Forget Key").click()
         await expect(page.locator("[data-said]")).to_have_text("To be deleted when you save")
         await expect(page.locator("[data-field='key'] [data-unsaved]")).to_be_visible()
+
+
+async def test_leaving_with_unsaved_input_asks_first(new_page: PageMaker, tmp_path: Path) -> None:
+    """After the change is undone or saved, the page can be left without a question."""
+    profile = open_document(rover(tmp_path))
+    async with running_managed(tmp_path / "data", [profile]) as address:
+        page = await new_page()
+        await settings_of(page, address)
+        asked: list[str] = []
+
+        async def stay(dialog: Dialog) -> None:
+            asked.append(dialog.type)
+            await dialog.dismiss()
+
+        page.on("dialog", stay)
+        back = page.get_by_role("link", name="Back to the menu")
+        port = page.get_by_label("Port")
+        await port.fill("7000")
+        await back.click(no_wait_after=True)
+        await until(lambda: asked == ["beforeunload"])
+        await expect(port).to_have_value("7000")
+        await port.fill("")
+        await expect(page.locator("[data-said]")).to_have_text("All changes are saved")
+        await back.click()
+        await page.wait_for_url(address)
+        assert asked == ["beforeunload"]
+
+
+async def test_another_driver_version_brings_its_own_settings(
+    new_page: PageMaker, tmp_path: Path
+) -> None:
+    """At once, not after a reload: without the new fields, the version could not be saved."""
+    data = tmp_path / "data"
+    store = Store(data / "packages")
+    text = DOCUMENTS["driver"]
+    older = text.replace("settings:\n", "settings:\n  baud: { type: integer, default: 9600 }\n")
+    newer = text.replace("settings:\n", "settings:\n  pace: { type: integer, default: 3 }\n")
+    install(store, package("driver", "rover", "1.0.0", text=older))
+    install(store, package("driver", "rover", "1.1.0", text=newer))
+    async with running_managed(data) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/rover/settings")
+        host, pace, baud = (page.locator(f"input[name='{name}']") for name in FIELDS)
+        await page.locator("summary").filter(has_text="Further settings").click()
+        await expect(pace).to_be_visible()
+        await host.fill("10.0.0.5")
+        version = page.locator("[data-version]")
+        await version.focus()
+        await version.select_option("1.0.0")
+        await expect(baud).to_be_visible()
+        await expect(pace).to_have_count(0)
+        await expect(host).to_have_value("10.0.0.5")
+        await expect(version).to_be_focused()
+        said = page.locator("[data-said]")
+        await expect(said).to_have_text("◆ 2 changes are not saved")
+        await baud.fill("19200")
+        await page.get_by_role("button", name="Save without testing").click()
+        await expect(said).to_contain_text("✓ Saved")
+        await page.goto(f"{address}robots/rover/settings")
+        await expect(baud).to_have_value("19200")
+        await expect(version).to_have_value("1.0.0")
+        answer = await page.request.get(f"{address}robots/rover/settings?version=9.9.9")
+        assert answer.status == 404

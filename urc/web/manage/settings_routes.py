@@ -72,7 +72,11 @@ class SettingsRoutes:
         return {"settings": self.save}
 
     async def page(self, request: Request) -> Response:
-        """Show the settings page of a robot."""
+        """Show the settings page of a robot.
+
+        The query parameter ``version`` selects an installed driver version, whose settings the page
+        then shows; "" is the newest version. The choice of the version is not stored.
+        """
         name = request.path_params["name"]
         html = await asyncio.to_thread(self._page, request, name)
         return HTMLResponse(html, headers=_NO_STORE)
@@ -92,6 +96,13 @@ class SettingsRoutes:
             if broken is None:
                 raise HTTPException(404, t("This server has no robot called “{name}”.", name=name))
             profile, fault = Profile(name, broken.title, ""), broken.fault
+        version = request.query_params.get("version")
+        if version is not None and lock is not None:
+            try:
+                bare = self._document(name, version)
+                profile, fault = factory.with_interfaces(bare, kept.interface), ""
+            except UrcError as error:
+                raise HTTPException(404, str(error)) from None
         filled = None if fault else factory.resolved_settings(profile, kept)
         return settings_page(
             request.state.nonce,

@@ -26,6 +26,7 @@ import { causeWords } from "../core/connection_causes.js";
 import { button, made, ready } from "../core/dom.js";
 import { mark, t } from "../core/words.js";
 import { SettingChanges } from "./setting_changes.js";
+import { renewGroups } from "./setting_groups.js";
 
 const KEPT_S = 365 * 24 * 3600;
 /** @type {Record<string, [string, string]>} */
@@ -47,6 +48,9 @@ const plain = form.querySelector("[data-plain]");
 const hint = form.querySelector("[data-save-hint]");
 const changes = new SettingChanges(form);
 let isBusy = false;
+const version = form.elements.namedItem("version");
+/** Driver version whose settings the form shows. */
+let shownVersion = chosen("version");
 
 /** @returns {Record<string, string | null>} */
 function filled() {
@@ -71,6 +75,7 @@ function chosen(name) {
 function offer() {
   const hasChange = changes.unsaved().length > 0;
   changes.show();
+  warn(hasChange);
   if (plain instanceof HTMLButtonElement) {
     plain.disabled = isBusy;
     plain.hidden = !hasChange;
@@ -83,6 +88,17 @@ function offer() {
   const open = form.querySelector("[data-open]");
   open?.classList.toggle("urc-button-main", !hasChange);
   if (open instanceof HTMLElement) open.hidden = !changes.isComplete();
+}
+
+/** Let the browser ask before the page is left. @param {boolean} hasChange */
+function warn(hasChange) {
+  if (hasChange) addEventListener("beforeunload", hold);
+  else removeEventListener("beforeunload", hold); // else browsers keep no copy for “Back”
+}
+
+/** @param {BeforeUnloadEvent} event */
+function hold(event) {
+  event.preventDefault();
 }
 
 /** @param {boolean} isLocked */
@@ -112,11 +128,11 @@ async function send({ test, anyway = false }) {
     });
     mistakes(answer.faults);
     lines(answer.lines);
-    showResults(answer.lines);
     const isTest = test && !hasChange && answer.isSaved;
     tell(`${answer.isSaved ? "✓" : "▲"} ${isTest ? t("Tested. The settings are unchanged.") : answer.text}`, answer.isSaved ? "" : "urc-bad");
     if (answer.isSaved) saved(sent);
     else if (answer.lines.length) offerAnyway();
+    showResults(answer.lines);
   } catch (error) {
     tell(`▲ ${reason(error)}`, "urc-bad");
   }
@@ -245,30 +261,48 @@ function lines(some) {
   );
 }
 
+/** Show the settings of the chosen driver version, which may differ from those of the former one. */
+async function changeVersion() {
+  if (!(version instanceof HTMLSelectElement)) return;
+  const wanted = version.value;
+  lock(true);
+  mistakes({});
+  lines([]);
+  try {
+    await renewGroups(form, changes, version);
+    shownVersion = wanted;
+    count();
+  } catch (error) {
+    version.value = shownVersion; // the fields are still those of this version
+    tell(`▲ ${reason(error)}`, "urc-bad");
+  }
+  lock(false);
+}
+
 form.addEventListener("submit", (event) => {
   event.preventDefault();
   void send({ test: true });
 });
 form.addEventListener("input", outdate);
-form.addEventListener("input", () => {
+form.addEventListener("input", (event) => {
   offer();
   count();
+  if (event.target === version) void changeVersion();
 });
 plain?.addEventListener("click", () => void send({ test: false }));
-for (const one of form.querySelectorAll("[data-forget]")) {
-  one.addEventListener("click", () => {
-    if (!(one instanceof HTMLElement)) return;
-    changes.forget(one.dataset["forget"] ?? "");
+// On the form, because another driver version brings other fields.
+form.addEventListener("click", ({ target }) => {
+  const pressed = target instanceof Element ? target.closest("[data-forget], [data-usual]") : null;
+  if (!(pressed instanceof HTMLElement)) return;
+  if (pressed.dataset["forget"] !== undefined) {
+    changes.forget(pressed.dataset["forget"]);
     offer();
     tell(t("To be deleted when you save"));
-  });
-}
-for (const one of form.querySelectorAll("[data-usual]")) {
-  one.addEventListener("click", () => {
-    const field = one.closest("[data-field]")?.querySelector("input, select");
-    if (field instanceof HTMLInputElement || field instanceof HTMLSelectElement) changes.useDefault(field);
-  });
-}
+    return;
+  }
+  const field = pressed.closest("[data-field]")?.querySelector("input, select");
+  if (field instanceof HTMLInputElement || field instanceof HTMLSelectElement) changes.useDefault(field);
+});
 ready(root);
 offer();
 if (tester) count();
