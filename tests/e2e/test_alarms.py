@@ -257,14 +257,14 @@ async def test_200_alarms_in_10_s_stay_quiet_and_none_is_lost(
         for at in range(COUNT):
             robot.set_reading(f"s{at}", 2, alarm="high")
             await asyncio.sleep(max(0.0, began + (at + 1) * 10 / COUNT - loop.time()))
-        await until_text(page, ".alerts-note", f"{COUNT} not acknowledged · 150 more")
+        await until_text(page, ".alerts-note", f"{COUNT} not acknowledged · 150 more alarms")
         seen: dict[str, Any] = await page.evaluate("() => ({ ...seen })")
         assert seen["tones"] <= 3, seen
         assert len(seen["said"]) <= 6, seen
         assert seen["flips"] == 1, "the strip comes once, and stays"
         assert seen["longest"] < 500, seen
         assert seen["shifted"] == [], "sticks and other widgets stay where they are"
-        assert await page.title() == f"▲ {COUNT} · Puppet · URC"
+        assert await page.title() == f"◆ {COUNT} · Puppet · URC"
         await page.click("[data-alarm-open]")
         bursts = page.locator("[data-alarm-list] > li")
         await page.locator("[data-burst]").first.wait_for()
@@ -273,7 +273,7 @@ async def test_200_alarms_in_10_s_stay_quiet_and_none_is_lost(
         grouped = sum(int(text.split()[0]) if "burst" in text else 1 for text in texts)
         assert grouped == COUNT, "every alarm is in one group"
         await page.click("[data-key=all]")
-        await until_text(page, ".alerts-note", "0 not acknowledged · 150 more")
+        await until_text(page, ".alerts-note", "0 not acknowledged · 150 more alarms")
         answer = await page.request.get(f"{address}api/v1/robots/puppet/alarms")
         listed = await answer.json()
         assert listed["flood"]

@@ -151,27 +151,38 @@ async def test_controls_are_out_of_sight_until_the_robot_is_back(
         await expect(control).to_have_css("opacity", "1")
 
 
-GAPS = """() => {
+GAP = """() => {
   const box = (selector) => document.querySelector(selector).getBoundingClientRect();
   const [card, view] = [box(".urc-lost-card"), box(".urc-cell:has(> .scan)")];
-  return [card.top - box("[data-place='ground']").bottom, view.top - card.bottom,
-    box(".urc-who").top - view.bottom];
+  return view.top - card.bottom;
 }"""
-"""Pixels between picture, card, view and the row above STOP."""
+"""Pixels between the card and the view below it."""
+SLACK = """() => {
+  const card = document.querySelector(".urc-lost-card");
+  const box = card.getBoundingClientRect();
+  const style = getComputedStyle(card);
+  const first = card.firstElementChild.getBoundingClientRect();
+  const last = card.lastElementChild.getBoundingClientRect();
+  const inside = last.bottom - first.top;
+  return box.height - inside - parseFloat(style.paddingTop) - parseFloat(style.paddingBottom);
+}"""
+"""Empty height in the card, in pixels."""
 
 
-async def test_on_a_phone_the_card_is_between_the_picture_and_the_views(
-    new_page: PageMaker,
-) -> None:
-    """It takes the place of the controls, without an empty band; the views say their age."""
+def lifting_robot(*views: WidgetUse) -> FakeRobot:
+    """Return a robot with values at the top, four controls below them, and views at the bottom."""
     names = ("lift", "raise", "hoist", "heave")
     lifts = [WidgetUse(one, "hold-button", {}, {"held": "lift"}) for one in names]
-    robot = seeing_robot(*lifts, WidgetUse("laser", "scan", {"scan": "laser"}))
-    rows = [Slot(one, 1 + row, 0) for row, one in enumerate(names)]
-    slots = (Slot("battery", 0, 0), *rows, Slot("laser", 5, 0))
-    grids = {"phone_portrait": Layout(6, 2, slots)}
+    robot = seeing_robot(*lifts, *views)
+    rows = [Slot(one, 1 + row, 0) for row, one in enumerate((*names, *(v.slot for v in views)))]
+    grids = {"phone_portrait": Layout(1 + len(rows), 2, (Slot("battery", 0, 0), *rows))}
     interface = Interface("default", "Default", grids, background="eye")
-    robot = FakeRobot(robot.profile._replace(interfaces={"default": interface}))
+    return FakeRobot(robot.profile._replace(interfaces={"default": interface}))
+
+
+async def test_on_a_phone_the_card_is_small_and_above_the_views(new_page: PageMaker) -> None:
+    """It takes the place of the controls, as low as possible; the views say their age."""
+    robot = lifting_robot(WidgetUse("laser", "scan", {"scan": "laser"}))
     async with running_dashboard(robot) as address:
         page = await new_page(size="phone")
         await page.goto(f"{address}robots/puppet/")
@@ -179,7 +190,27 @@ async def test_on_a_phone_the_card_is_between_the_picture_and_the_views(
         robot.link("lost", REFUSED)
         await expect(page.locator(CARD)).to_be_visible()
         await expect(page.locator(".urc-cell:has(> .scan)")).to_have_css("opacity", "1")
-        await page.wait_for_function(f"() => ({GAPS})().every((gap) => gap >= 0 && gap <= 24)")
+        await page.wait_for_function(f"() => ({GAP})() >= 0 && ({GAP})() <= 24")
+        assert await page.evaluate(SLACK) <= 6, "its edges"
+        await page.wait_for_function(f"() => ({COVERED})().length === 0")
+
+
+async def test_on_a_phone_the_card_is_next_to_stop_if_nobody_drives(new_page: PageMaker) -> None:
+    """The row of the driver is empty, so the card takes its place."""
+    robot = lifting_robot()
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.link("lost", REFUSED)
+        await expect(page.locator(CARD)).to_be_visible()
+        await page.wait_for_function(
+            """() => {
+              const box = (selector) => document.querySelector(selector).getBoundingClientRect();
+              const gap = box("[data-stop-button]").top - box(".urc-lost-card").bottom;
+              return gap >= 4 && gap <= 24;
+            }"""
+        )
         await page.wait_for_function(f"() => ({COVERED})().length === 0")
 
 

@@ -26,7 +26,8 @@ WHOLE_ROWS = """() => [...document.querySelectorAll("[data-robot-card]")]
 # Parts of a card that lie over each other, but for the link, which covers the card, and the marks
 # in the corners of the image.
 OVERLAPS = """() => [...document.querySelectorAll("[data-robot-card]")].flatMap((card) => {
-  const words = [".urc-robot-title", ".urc-robot-kind", ".urc-robot-state", ".urc-robot-go"];
+  const words = [".urc-robot-title", ".urc-robot-kind", ".urc-robot-state", ".urc-robot-facts",
+    ".urc-robot-go"];
   const marks = [".urc-sim", ".urc-more-button"];
   const place = (selector) => [...card.querySelectorAll(selector)]
     .map((el) => el.getBoundingClientRect()).filter(({ width }) => width > 0);
@@ -83,11 +84,11 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
         await menu.get_by_role("button", name="Connected 1").click()
         await expect(menu.locator("[data-robot-card]:visible")).to_have_count(1)
         await robot_page.close()
-        await expect(state).to_contain_text("Seen just now", timeout=PATIENCE_MS)
+        await expect(state).to_contain_text("Last seen just now", timeout=PATIENCE_MS)
 
 
-async def test_a_card_says_its_state_or_its_action_in_large_letters(new_page: PageMaker) -> None:
-    """“Connect” says that nothing is connected; screen readers are told so too."""
+async def test_a_card_says_its_state_and_its_action(new_page: PageMaker) -> None:
+    """Also before the first connection: then it says what is known without one."""
     robots = fleet(2)
     async with running_dashboard(*robots) as address:
         for size in ("phone", "desktop"):
@@ -97,9 +98,11 @@ async def test_a_card_says_its_state_or_its_action_in_large_letters(new_page: Pa
             await expect(idle.get_by_role("link")).to_have_accessible_description(
                 re.compile("Not connected")
             )
+            await expect(idle.locator("[data-link]")).to_have_text("○ Not connected yet")
             state = await idle.locator("[data-link]").bounding_box()
             assert state is not None
-            assert state["width"] <= 1
+            assert state["width"] > 20
+            await expect(idle.locator(".urc-robot-facts")).to_contain_text("TCP")
             await expect(idle.locator(".urc-robot-go")).to_have_text(re.compile("Connect"))
             action = await idle.locator(".urc-robot-go").bounding_box()
             assert action is not None

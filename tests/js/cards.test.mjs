@@ -20,12 +20,12 @@ function robot(more = {}) {
 
 test("without a page the card says when the robot was last seen", () => {
   const away = (/** @type {number} */ ageS) => linkWords(robot({ seen_at: NOW_S - ageS }), NOW_S).words;
-  assert.equal(linkWords(robot(), NOW_S).words, "○ Not connected");
-  assert.equal(away(5), "○ Seen just now");
-  assert.equal(away(-5), "○ Seen just now"); // the clock went back
-  assert.equal(away(600), "○ Seen 10 min ago");
-  assert.equal(away(47 * 3600), "○ Seen 47 h ago");
-  assert.equal(away(72 * 3600), "○ Seen 3 days ago");
+  assert.equal(linkWords(robot(), NOW_S).words, "○ Not connected yet");
+  assert.equal(away(5), "○ Last seen just now");
+  assert.equal(away(-5), "○ Last seen just now"); // the clock went back
+  assert.equal(away(600), "○ Last seen 10 min ago");
+  assert.equal(away(47 * 3600), "○ Last seen 47 h ago");
+  assert.equal(away(72 * 3600), "○ Last seen 3 days ago");
 });
 
 test("with a page the card shows the worst connection", () => {
@@ -54,7 +54,7 @@ test("a latched stop matters more than the operator", () => {
 test("alarms are counted, and the worst decides about the sign", () => {
   const of = (/** @type {number} */ count, /** @type {any} */ worst) => alarmWords(robot({ alarms: { count, worst } }));
   assert.equal(of(0, ""), null);
-  assert.deepEqual(of(1, "low"), { words: "◆ 1 alarm", tone: "caution" });
-  assert.equal(of(2, "medium")?.tone, "caution");
+  assert.deepEqual(of(1, "low"), { words: "◇ 1 alarm", tone: "caution" });
+  assert.deepEqual(of(2, "medium"), { words: "◆ 2 alarms", tone: "caution" });
   assert.deepEqual(of(3, "high"), { words: "▲ 3 alarms", tone: "bad" });
 });

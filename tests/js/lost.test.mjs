@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { install } from "./dom.mjs";
 import { Badge } from "../../urc/web/static/live/badge.js";
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { largestGap, lastWords, lossOf, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
+import { lastWords, lossOf, lowestGap, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -132,13 +132,15 @@ test("without the server it is the page that keeps trying", () => {
   assert.equal(triesWords({ of: "server", detail: "" }, store, 0, 65_000), "for 1 min · This page keeps trying");
 });
 
-test("the card is in the largest place that is free between what stays in sight", () => {
+test("the card is in the lowest place that is high enough between what stays in sight", () => {
   const picture = { top: 48, bottom: 348 };
   const value = { top: 284, bottom: 342 };
   const view = { top: 602, bottom: 692 };
-  assert.deepEqual(largestGap([view, picture, value], 48, 692), { top: 356, bottom: 594 });
-  assert.deepEqual(largestGap([picture, value], 48, 692), { top: 356, bottom: 692 });
-  assert.deepEqual(largestGap([], 48, 692), { top: 48, bottom: 692 });
-  assert.deepEqual(largestGap([{ top: 0, bottom: 900 }], 48, 692), { top: 692, bottom: 692 }, "nothing is free");
-  assert.deepEqual(largestGap([picture, { top: 400, bottom: 400 }], 48, 692), { top: 356, bottom: 692 }, "an empty box");
+  assert.equal(lowestGap([view, picture, value], 48, 692, 200), 594, "above the view");
+  assert.equal(lowestGap([view, picture, value], 48, 760, 60), 760, "below the view");
+  assert.equal(lowestGap([picture, value], 48, 692, 336), 692);
+  assert.equal(lowestGap([picture, value], 48, 692, 337), null, "too high for the place");
+  assert.equal(lowestGap([], 48, 692, 644), 692);
+  assert.equal(lowestGap([{ top: 0, bottom: 900 }], 48, 692, 1), null, "nothing is free");
+  assert.equal(lowestGap([picture, { top: 400, bottom: 400 }], 48, 692, 300), 692, "an empty box");
 });

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { noteOf } from "../../urc/web/static/widgets/kit.js";
 import { watched } from "../../urc/web/static/live/page_topics.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
@@ -38,4 +39,20 @@ test("of what has an alarm it is counted what is known", () => {
   assert.deepEqual(watched(store, 7000).value, { limited: 2, known: 2 });
   store.setUp(false, 7000);
   assert.deepEqual(watched(store, 7001).value, { limited: 2, known: 0 });
+});
+
+test("an alarm has the shape of its declared priority", () => {
+  const charge = { name: "charge", priorities: { lolo: "medium", low: "low" } };
+  const mode = { name: "mode", type: "string", priorities: { REDUCED: "low", FAULT: "high", SAFEGUARD: "medium" } };
+  const store = storeOf(charge, mode, { name: "heat" });
+  const note = (/** @type {string} */ name) => noteOf(store.reading(name, 0), (text) => text);
+  const say = (/** @type {any} */ v, /** @type {string[]} */ s) => store.values({ n: 0, i: [0, 1, 2], v, a: 0, s: /** @type {any} */ (s) }, 0);
+  say([15, "REDUCED", 90], ["low", "minor", "high"]);
+  assert.deepEqual(["charge", "mode", "heat"].map(note), ["◇ Low", "◇ Warning", "◆ High"]);
+  say([5, "FAULT", 99], ["lolo", "major", "hihi"]);
+  assert.deepEqual(["charge", "mode", "heat"].map(note), ["◆ Very low", "▲ Alarm", "▲ Very high"]);
+  say([50, "SAFEGUARD", 20], ["", "minor", ""]);
+  assert.deepEqual(["charge", "mode", "heat"].map(note), ["", "◆ Warning", ""]);
+  say([50, "NORMAL", 20], ["", "minor", ""]);
+  assert.equal(note("mode"), "◆ Warning"); // the alarm state has ended, and the off-delay has not
 });

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 
 from urc.model.role import Role
+from urc.model.values import AlarmPriority
 
 __all__ = [
     "CLOSE_BAD_MESSAGES",
@@ -84,6 +85,9 @@ class SignalRow(msgspec.Struct, omit_defaults=True, frozen=True):
     """The signal's axis convention; "" if unknown."""
     has_alarms: bool = False
     """Whether a limit or state of the signal can cause an alarm."""
+    priorities: dict[str, AlarmPriority] | None = None
+    """Priority of each limit and alarm state; None if all have their usual priority: ``high`` for
+    ``lolo`` and ``hihi``, otherwise ``medium``."""
     frozen_after_s: float | None = None
     """Time in seconds after which equal images of a video count as one image; None means never."""
 

@@ -2,7 +2,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Alert} Alert */
-import { ALARMS, attribute, button, part, write } from "urc/kit";
+import { ALARMS, SIGNS, attribute, button, part, write } from "urc/kit";
 import { hush, say } from "./voice.js";
 
 /** Maximum number of drawn alarms; the widget only counts the others. */
@@ -37,14 +37,19 @@ export default {
 
     /** @param {Alert[]} fresh */
     function spokenOf(fresh) {
-      const words = fresh.slice(0, 3).map((alert) => `${alert.title}: ${wordOf(alert).replace(/^[▲◆]\s*/, "")}`);
-      const more = fresh.length > 3 ? [t("{count} more", { count: fresh.length - 3 })] : [];
+      const words = fresh.slice(0, 3).map((alert) => `${alert.title}: ${wordOf(alert)}`);
+      const more = fresh.length > 3 ? [moreAlarms(fresh.length - 3)] : [];
       return [...words, ...more].join(". ");
+    }
+
+    /** @param {number} count */
+    function moreAlarms(count) {
+      return count === 1 ? t("1 more alarm") : t("{count} more alarms", { count });
     }
 
     /** @param {Alert} alert */
     function wordOf({ alarm, condition }) {
-      return alarm === "major" || alarm === "minor" ? `${t(ALARMS[alarm]).slice(0, 1)} ${condition}` : t(ALARMS[alarm]);
+      return alarm === "major" || alarm === "minor" ? condition : t(ALARMS[alarm]);
     }
 
     function show() {
@@ -64,7 +69,7 @@ export default {
       const said = alerts.length === 0 ? [calm()] : [
         t("{count} not acknowledged", { count }),
         shelved > 0 ? t("{count} shelved", { count: shelved }) : "",
-        left > 0 ? t("{count} more", { count: left }) : "",
+        left > 0 ? moreAlarms(left) : "",
       ];
       const words = [...said, unknown()].filter(Boolean).join(" · ");
       write(note, alerts.length === 0 ? `— ${words}` : words);
@@ -116,7 +121,7 @@ export default {
       const isState = alert.alarm === "major" || alert.alarm === "minor";
       const value = isState ? "" : `: ${alert.text}${alert.unit ? ` ${alert.unit}` : ""}`;
       const old = alert.age ? ` · ${t("{age} old", { age: alert.age })}` : "";
-      write(part(item, ".alerts-words"), `${alert.isActive ? wordOf(alert) : "✓"} · ${alert.title}${value}${old}`);
+      write(part(item, ".alerts-words"), `${alert.isActive ? `${SIGNS[alert.priority]} ${wordOf(alert)}` : "✓"} · ${alert.title}${value}${old}`);
       const name = alert.who;
       const states = {
         unacknowledged: alert.action,

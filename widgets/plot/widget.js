@@ -24,6 +24,11 @@ const LOOSE = 0.4;
 /** Margin above and below, as a fraction of the height. */
 const RIM = 0.05;
 
+/** @param {number} count @param {Context} ctx */
+function moreReadings(count, ctx) {
+  return count === 1 ? ctx.t("1 more reading") : ctx.t("{count} more readings", { count });
+}
+
 class Plot {
   /** @param {Context} ctx */
   constructor(ctx) {
@@ -32,7 +37,7 @@ class Plot {
     this.root = part(el, ".plot");
     this.board = part(el, ".plot-board");
     this.note = part(el, ".plot-note");
-    this.legend = new SmallLegend(this.root, part(el, ".plot-legend"), (count) => ctx.t("{count} more", { count }), ctx.signal);
+    this.legend = new SmallLegend(this.root, part(el, ".plot-legend"), (count) => moreReadings(count, ctx), ctx.signal);
     this.pauseButton = part(el, ".plot-pause");
     this.place = part(el, ".plot-history");
     this.windowS = seconds(options["window"]);

@@ -17,6 +17,11 @@ const EVERY_MS = 200;
 /** Interval at which the ages of diagnosed parts are checked. */
 const AGES_MS = 1000;
 
+/** @param {number} count @param {Context} ctx */
+function moreRows(count, { t }) {
+  return count === 1 ? t("1 more row") : t("{count} more rows", { count });
+}
+
 class Table {
   /** @param {Context} ctx */
   constructor(ctx) {
@@ -29,7 +34,7 @@ class Table {
     const table = el.querySelector("table");
     if (!table) throw new Error("the template has no table");
     const [room, scroll, more] = [part(el, ".table-room"), part(el, ".table-scroll"), part(el, ".table-more")];
-    keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${t("{count} more", { count })}`, ctx.signal);
+    keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${moreRows(count, ctx)}`, ctx.signal);
     const filter = el.querySelector(".table-filter");
     this.filter = filter instanceof HTMLInputElement ? filter : null;
     this.filter?.addEventListener("input", () => this.draw(), { signal: ctx.signal });

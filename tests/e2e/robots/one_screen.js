@@ -34,7 +34,7 @@
     }
   }
   const stop = document.querySelector(".urc-stop-button");
-  const parts = shown(".urc-cell:not([data-place='ground']), .urc-verbs > *, .urc-latched > .urc-button, .urc-drawer-handle, [data-place='ground'] button");
+  const parts = shown(".urc-cell:not([data-place='ground']), .urc-take, .urc-verbs > *, .urc-latched > .urc-button, .urc-drawer-handle, [data-place='ground'] button");
   for (const el of stop ? parts : []) {
     const [a, b] = [boxOf(stop), boxOf(el)];
     const across = Math.max(a.left - b.right, b.left - a.right, 0);

@@ -24,7 +24,7 @@
   }
   const faults = [];
   const cells = [...document.querySelectorAll('.urc-cell:not([data-place="ground"])')].filter(isShown);
-  const dock = [...document.querySelectorAll(".urc-stop-button, .urc-who, .urc-verbs > *, .urc-drawer-handle")].filter(isShown);
+  const dock = [...document.querySelectorAll(".urc-stop-button, .urc-who, .urc-take, .urc-verbs > *, .urc-drawer-handle")].filter(isShown);
   const name = (el) => (el.dataset.config ? JSON.parse(el.dataset.config).slot : el.className);
   const scrolls = stage.scrollHeight > stage.clientHeight + SLACK;
   // Captions and buttons of the background are above the widgets on a phone in portrait.

@@ -9,7 +9,7 @@ from urc.expressions import compile_expression
 from urc.model.driver import Command, Driver, Message, Poll, Reply
 from urc.model.exchange import Hold
 from urc.model.profile import Profile
-from urc.model.values import AlarmLimits, Sample, Signal
+from urc.model.values import AlarmAttributes, AlarmLimits, Sample, Signal
 from urc.runtime.hub import LinkStatus, LogEntry
 from urc.testing.profile import regex, text
 from urc.web.wire import messages as wire
@@ -92,6 +92,27 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
         "roles": {"home": "drive", "calibrate": "maintain", "drive": "drive"},
         "controls": ["drive"],
     }  # fmt: skip
+
+
+def test_hello_tells_the_priorities_that_are_not_the_usual_ones() -> None:
+    """Usual ones are not sent: most robots declare no others."""
+    low, high = AlarmAttributes("low"), AlarmAttributes("high")
+    limits = AlarmLimits(lolo=5, low=10, attributes=(("low", low),))
+    states = AlarmLimits(states=("open", "fault"), attributes=(("fault", high),))
+    usual = AlarmLimits(hihi=5, high=4, attributes=(("hihi", high),))
+    driver = Driver(
+        signals={
+            "charge": Signal("charge", "number", limits=limits),
+            "door": Signal("door", "string", limits=states),
+            "heat": Signal("heat", "number", limits=usual),
+        }
+    )
+    hello = json.loads(wire.encode_hello(Profile("p", "P", "p.yaml", driver=driver), "s1", 2.0))
+    assert [one.get("priorities") for one in hello["signals"]] == [
+        {"lolo": "high", "low": "low"},
+        {"open": "medium", "fault": "high"},
+        None,
+    ]
 
 
 def test_hello_tells_which_videos_the_page_compares() -> None:

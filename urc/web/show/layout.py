@@ -178,7 +178,7 @@ def _button(
 
 
 def _more(count: int, before: str = "") -> str:
-    """Return CSS for “3 more” in the language of the page; "" for 0."""
+    """Return CSS for “3 more widgets” in the language of the page; "" for 0."""
     if count == 1:
         return f'"{before}" attr(data-rest-one)' if before else "attr(data-rest-one)"
     if not count:

@@ -18,6 +18,7 @@ from urc.web.fleet.fleet import BrokenRobot
 from urc.web.fleet.robots import Robot, missing_settings
 from urc.web.show.cells import spoken
 from urc.web.show.pages import PageHead, render
+from urc.web.show.robot_address import robot_address
 from urc.web.words import t
 
 __all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_page", "setting_row"]
@@ -88,6 +89,8 @@ class Card:
     """Names of the missing settings, for use on the command line."""
     initials: str
     """One or two letters, shown in place of a missing image."""
+    address: str = ""
+    """Kind and address of the robot's connection; "" if unknown."""
     settings_url: str = ""
     """URL of the robot's settings page; "" if it has no settings page."""
     dev_url: str = ""
@@ -193,6 +196,7 @@ def _card(name: str, robot: Robot, ways: NavigationLinks, driver: str) -> Card:
         missing=tuple(row.title for row in rows if row.is_missing),
         missing_names=tuple(one.name for one in missing),
         initials=_initials(title),
+        address=robot_address(robot) if robot.playback is None else "",
         settings_url=settings_url,
         dev_url=f"{url}dev" if ways.has_dev else "",
         is_live=not missing and robot.playback is None,

@@ -36,12 +36,19 @@ receives heartbeats.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeVar
+from typing import Final, TypeVar
 
 import msgspec
 
 from urc.model.profile import Profile
-from urc.model.values import NOTHING, Reading, Sample, Signal
+from urc.model.values import (
+    NOTHING,
+    AlarmLimits,
+    AlarmPriority,
+    Reading,
+    Sample,
+    Signal,
+)
 from urc.runtime.connection_cause import cause_of
 from urc.runtime.hub import LinkStatus, LogEntry
 from urc.runtime.signal_sources import sources_of
@@ -98,6 +105,7 @@ __all__ = [
 ]
 
 _AS_THEY_ARE = frozenset((float, bool, type(None)))
+_LIMITS: Final = ("lolo", "low", "high", "hihi")
 _EXACT = 2**53 - 1  # browsers cannot represent all integers above this limit
 
 
@@ -282,12 +290,19 @@ def _plain(value: object) -> object:
     return repaired(cut(str(value)))
 
 
+def _priorities(limits: AlarmLimits) -> dict[str, AlarmPriority] | None:
+    """Return the priorities of all conditions; None if all conditions have their usual priority."""
+    numeric = [name for name in _LIMITS if getattr(limits, name) is not None]
+    found = {one: limits.attributes_of(one).priority for one in (*numeric, *limits.states)}
+    usual = AlarmLimits()
+    is_usual = all(usual.attributes_of(one).priority == found[one] for one in found)
+    return None if is_usual else found
+
+
 def _signal(signal: Signal, sources: tuple[str, ...], *, is_playback: bool) -> SignalRow:
     is_compared = signal.type == "video" and not is_playback
     limits = {
-        name: value
-        for name in ("lolo", "low", "high", "hihi")
-        if (value := getattr(signal.limits, name)) is not None
+        name: value for name in _LIMITS if (value := getattr(signal.limits, name)) is not None
     }
     return SignalRow(
         name=signal.name,
@@ -303,5 +318,6 @@ def _signal(signal: Signal, sources: tuple[str, ...], *, is_playback: bool) -> S
         sources=sources,
         axes=signal.axes,
         has_alarms=not signal.limits.is_empty,
+        priorities=_priorities(signal.limits),
         frozen_after_s=signal.frozen_after_s or None if is_compared else None,
     )

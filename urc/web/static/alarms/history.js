@@ -4,11 +4,12 @@
  *
  * @typedef {import("./actions.js").AlarmEvent} AlarmEvent
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { reason } from "../core/api_client.js";
 import { made } from "../core/dom.js";
 import { t } from "../core/words.js";
 import { write } from "../widgets/kit.js";
-import { conditionText, EVENTS, SIGNS } from "./phrases.js";
+import { conditionText, EVENTS } from "./phrases.js";
 
 const AT_ONCE = 50;
 /** Typing pause before the search starts. */

@@ -9,6 +9,7 @@
  * @typedef {import("./book.js").AlarmRow} AlarmRow
  * @typedef {import("./book.js").AlarmsMessage} AlarmsMessage
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { reason } from "../core/api_client.js";
 import { t } from "../core/words.js";
 import { AlarmActions } from "./actions.js";
@@ -154,9 +155,9 @@ export class PageAlarms {
     const { book, store, mayAct } = this;
     this.strip.draw(book, store, nowMs, mayAct);
     this.sheet.draw(book, store, nowMs, mayAct);
-    const { active, unacknowledged } = book.count();
+    const { active, unacknowledged, worst } = book.count();
     const count = Math.max(active, unacknowledged);
-    const title = count > 0 ? `▲ ${count} · ${this.title}` : this.title;
+    const title = count > 0 ? `${SIGNS[worst || "low"]} ${count} · ${this.title}` : this.title;
     if (document.title !== title) document.title = title;
   }
 

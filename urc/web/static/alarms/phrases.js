@@ -10,8 +10,6 @@ import { mark, t } from "../core/words.js";
 import { ALARMS } from "../widgets/kit.js";
 import { levelOf } from "./book.js";
 
-/** Shape of each priority, because colour alone is not enough. */
-export const SIGNS = Object.freeze({ high: "▲", medium: "◆", low: "■" });
 /**
  * Return the number of alarms that are not shown, as text; "" without any.
  *
@@ -59,7 +57,7 @@ export const EVENTS = Object.freeze({
  */
 export function conditionText(condition) {
   const known = /** @type {Record<string, string>} */ (ALARMS)[condition];
-  return known ? t(known).replace(/^[▲◆■]\s*/u, "") : stateWords(condition);
+  return known ? t(known) : stateWords(condition);
 }
 
 /**

@@ -16,13 +16,15 @@
  * @property {() => boolean} isMuted
  * @property {() => void} closed
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { made, put } from "../core/dom.js";
+import { inTurn } from "../core/formatting.js";
 import { t } from "../core/words.js";
 import { attribute, write } from "../widgets/kit.js";
 import { SHELF_MINUTES } from "./actions.js";
 import { byFirstOut, byUrgency, grouped } from "./book.js";
 import { AlarmHistory } from "./history.js";
-import { conditionText, leftText, lineOf, PRIORITIES, SIGNS, STATES, titleOf } from "./phrases.js";
+import { conditionText, leftText, lineOf, moreAlarms, PRIORITIES, STATES, titleOf } from "./phrases.js";
 
 /**
  * Limit on displayed alarms; further alarms are only counted, so that a flood does not slow the
@@ -68,6 +70,7 @@ export class AlarmSheet {
       made("div", { class: "urc-alarm-head" }, this.title, this.button(t("Close"), "close", () => this.close())),
       made("div", { class: "urc-alarm-tools" }, this.all, this.order, this.mute),
       this.note,
+      made("p", { class: "urc-alarm-note", "data-alarm-legend": true }, legend()),
       this.list,
       this.hiddenTitle,
       this.hiddenList,
@@ -167,7 +170,7 @@ export class AlarmSheet {
     this.waiting = sight.filter(({ state }) => state === "unacknowledged" || state === "returned");
     this.all.hidden = !mayAct || this.waiting.length < 2;
     write(this.all, t("Acknowledge all {count}", { count: this.waiting.length }));
-    if (left < 0) items.push(made("li", { class: "urc-alarm-rest" }, t("and {count} more", { count: -left })));
+    if (left < 0) items.push(made("li", { class: "urc-alarm-rest" }, moreAlarms(-left)));
     return items;
   }
 
@@ -293,6 +296,11 @@ export class AlarmSheet {
   button(text, key, act) {
     return made("button", { class: "urc-button", type: "button", "data-key": key, onclick: act }, text);
   }
+}
+
+/** Return the shape of each priority with its name, on one line if there is room. */
+function legend() {
+  return inTurn(Object.entries(SIGNS).map(([priority, sign]) => `${sign} ${t(PRIORITIES[priority] ?? priority)}`));
 }
 
 /** @param {number} minutes */

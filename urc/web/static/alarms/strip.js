@@ -8,10 +8,11 @@
  * @typedef {import("./book.js").AlarmRow} AlarmRow
  * @typedef {import("../live/store.js").Store} Store
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { made } from "../core/dom.js";
 import { t } from "../core/words.js";
 import { attribute, write } from "../widgets/kit.js";
-import { lineOf, moreAlarms, SIGNS } from "./phrases.js";
+import { lineOf, moreAlarms, PRIORITIES } from "./phrases.js";
 
 export class AlarmStrip {
   /**
@@ -25,6 +26,8 @@ export class AlarmStrip {
     this.el = el;
     this.buttonFor = buttonFor;
     this.sign = made("span", { class: "urc-alarm-sign", "aria-hidden": "true" });
+    /** The name of the shape, for screen readers. */
+    this.priority = made("span", { class: "urc-hidden" });
     this.line = made("span", { class: "urc-alarm-line" });
     this.action = made("span", { class: "urc-alarm-action" });
     this.more = made("span", { class: "urc-alarm-more" });
@@ -53,6 +56,7 @@ export class AlarmStrip {
       "button",
       { class: "urc-alarm-open", type: "button", "data-alarm-open": true, "aria-expanded": "false", onclick: open },
       this.sign,
+      this.priority,
       text,
       this.more,
     );
@@ -75,6 +79,9 @@ export class AlarmStrip {
     attribute(this.el, "data-priority", first.active ? first.priority : "");
     attribute(this.el, "data-flash", unacknowledged > 0 && first.active ? "true" : null);
     write(this.sign, first.active ? SIGNS[first.priority] : "✓");
+    const priority = first.active ? t(PRIORITIES[first.priority] ?? first.priority) : "";
+    write(this.priority, priority && `${priority}. `);
+    attribute(this.sign, "title", priority || null);
     const line = lineOf(first, store, nowMs, false); // an age would change the height of the strip
     write(this.line, first.active ? line : t("{alarm}: back to normal", { alarm: line }));
     write(this.action, first.active ? first.action : "");

@@ -16,9 +16,9 @@ import { said, t } from "../core/words.js";
 const VERBS = ["reset", "take", "ask", "force", "yes", "no", "override", "leave"];
 /** Duration of the ring around Reset after a press on a stopped control. */
 const POINTED_MS = 1500;
-/** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
 /** A stick, which takes control when it is touched. */
 const STICK = '.urc-cell[data-footprint="stick"]';
+/** Verbs of operators who want to drive. @type {ReadonlySet<Verb>} */
 const BEFORE_DRIVING = new Set(["reset", "take", "ask", "force"]);
 
 export class Controls {
@@ -38,6 +38,7 @@ export class Controls {
     /** Timer of the ring around Reset. @type {ReturnType<typeof setTimeout> | undefined} */
     this.pointing = undefined;
     this.who = part(el, "[data-who]");
+    this.take = part(el, '[data-verb="take"]');
     this.latched = part(root, "[data-latched]");
     this.latchedText = part(root, "[data-latched-text]");
     this.latchedNext = part(root, "[data-latched-next]");
@@ -130,8 +131,7 @@ export class Controls {
     const leftS = Math.max(0, Math.ceil((drive.handedMs - nowMs) / 1000));
     const text = drive.refusal ? `◆ ${said(drive.refusal)}` : this.words(isMine, isAsked, iAsk, leftS, (drive.overrideMs - nowMs) / 1000);
     if (this.who.textContent !== text) this.who.textContent = text;
-    const hint = text === t("Free") && document.querySelector(STICK) ? `: ${t("touch the stick")}` : "";
-    if ((this.who.dataset["hint"] ?? "") !== hint) this.who.dataset["hint"] = hint;
+    if (shown.take) this.nameTake(text);
     const stopped = isLatched ? this.stoppedWords() : "";
     if (this.latchedNext.hidden === may) this.latchedNext.hidden = !may;
     if (this.latchedText.textContent !== stopped) this.latchedText.textContent = stopped;
@@ -167,6 +167,22 @@ export class Controls {
     if (lease.holder) return t("{who} is driving", { who: holder });
     if (lease.latched) return ""; // the bar says it
     return lease.drives ? t("Free") : t("No one is driving; this page only watches");
+  }
+
+  /**
+   * Name the button that says who drives, and how to drive: a touch of a stick does the same as a press
+   * of the button.
+   *
+   * @param {string} who
+   */
+  nameTake(who) {
+    const sticks = document.querySelectorAll(STICK).length;
+    const held = this.input.grips.size > 0 ? t("hold a control") : t("take control");
+    const way = sticks === 0 ? held : sticks === 1 ? t("touch the stick") : t("touch a stick");
+    const text = `${who}: ${way}`;
+    if (this.take.textContent === text) return;
+    this.take.textContent = text;
+    this.take.setAttribute("aria-label", `${text}. ${t("Take control")}`);
   }
 
   /** Return the text in the bar for a latched STOP. */

@@ -9,6 +9,7 @@
  *   number of `bytes`.
  * @typedef {"" | "lolo" | "low" | "high" | "hihi" | "minor" | "major"} Alarm The exceeded limit, or the
  *   severity of an alarm state.
+ * @typedef {"low" | "medium" | "high"} AlarmPriority
  * @typedef {"live" | "stale" | "gone" | "none"} State
  *   live: recent. stale: old, or its link is down; shown in grey with its age. gone: too old to be
  *   shown. none: never received, or not available according to the robot.
@@ -24,6 +25,8 @@
  * @property {Record<string, string>} [states]
  * @property {Partial<Record<"lolo" | "low" | "high" | "hihi", number>>} [limits]
  * @property {boolean} [has_alarms] Whether a limit or a state causes an alarm.
+ * @property {Record<string, AlarmPriority>} [priorities] Priority of each limit and alarm state; omitted
+ *   if all have their usual priority.
  * @property {number} [stale_after_s]
  * @property {number} [frozen_after_s] Time after which equal images of a video count as one image.
  * @property {string[]} [sources]
@@ -35,6 +38,7 @@
  *   null in the states `gone` and `none`.
  * @property {State} state
  * @property {Alarm} alarm
+ * @property {AlarmPriority | ""} [priority] Priority of the alarm; "" without an alarm.
  * @property {string} text Value for people, in the displayed unit and precision; "—" without a value.
  * @property {string} unit Symbol of the unit of `text`, or "".
  * @property {string} age Age for people, such as "4 s"; "" while it is live.

@@ -16,7 +16,7 @@
  * @property {(number | null)[]} past one value per second, oldest first
  * @property {boolean} isVisible
  */
-import { ALARMS, DASH, attribute, t, write } from "urc/kit";
+import { DASH, alarmText, attribute, t, write } from "urc/kit";
 import { part } from "../live/badge.js";
 import { visible } from "./bytes.js";
 import { PICTURES, ageText } from "../live/store.js";
@@ -81,7 +81,7 @@ export class DebugSignals {
       if (!row.isVisible) continue;
       attribute(row.el, "data-state", reading.state);
       write(row.value, shown(reading));
-      write(row.alarm, t(ALARMS[reading.alarm] ?? reading.alarm));
+      write(row.alarm, alarmText(reading, t));
       attribute(row.alarm, "data-alarm", reading.alarm);
       write(row.age, reading.state === "none" ? DASH : ageText(nowMs / 1000 - reading.time));
       if (isSampled) draw(row);

@@ -9,7 +9,7 @@
 const GAP = 6;
 /** Minimum time between two placements, in ms; the text of a caption changes often. */
 const SOONEST_MS = 200;
-const DOCK = ".urc-stop-button, .urc-who, .urc-verbs > *";
+const DOCK = ".urc-stop-button, .urc-who, .urc-take, .urc-verbs > *";
 const STRIP = ".urc-alarm-strip";
 /** Parts of the background that its captions must not cover, for example a question. */
 const TAKEN = "[data-taken]";

@@ -41,7 +41,7 @@ export class LostCard {
     this.again = part(el, "[data-lost-again]");
     this.age = part(el, "[data-lost-age]");
     this.shown = "";
-    /** Height of what stays in sight between the card and STOP's row. */
+    /** Height of what stays in sight between the card and STOP. */
     this.footPx = 0;
     /** Transports that only commands open. @type {string[]} */
     this.onDemand = JSON.parse(el.dataset["onDemand"] ?? "[]");
@@ -103,9 +103,9 @@ export class LostCard {
     const { paddingTop, paddingBottom } = getComputedStyle(this.el);
     const isTall = isPortraitPhone() && this.root.querySelector('.urc-grid > [data-place="ground"]') !== null;
     const bottom = room.bottom - parseFloat(paddingBottom) + this.footPx;
-    const isFilled = isTall && this.fill(room.top, bottom);
-    this.el.toggleAttribute("data-fills", isFilled);
-    if (isFilled) {
+    const isPlaced = isTall && this.placeLow(room.top, bottom, card.height);
+    this.el.toggleAttribute("data-low", isPlaced);
+    if (isPlaced) {
       this.el.removeAttribute("data-top");
       return;
     }
@@ -120,26 +120,26 @@ export class LostCard {
   }
 
   /**
-   * Fill the place of the controls, between the cells that stay in sight. If it is too low for the card,
-   * the card also takes the place of the views, or else lies over the background.
+   * Put the card as low as possible, near the thumb, between the cells that stay in sight. If no place is
+   * high enough, the card also takes the place of views, or else lies over the background.
    *
    * @param {number} top first pixel of the stage on the screen
-   * @param {number} bottom last pixel above STOP and its row
+   * @param {number} bottom last pixel above STOP
+   * @param {number} height of the card
    * @returns {boolean} whether the card has a place
    */
-  fill(top, bottom) {
+  placeLow(top, bottom, height) {
     const ground = [...this.root.querySelectorAll('.urc-grid > [data-place="ground"]')].map(boxOf);
     const views = [...this.root.querySelectorAll(VIEWS)];
     const kept = [...this.root.querySelectorAll(KEPT)].map(boxOf);
-    const need = naturalHeight(part(this.el, ".urc-lost-card"));
     const seen = [...kept, ...views.map(boxOf)];
-    const places = [[...seen, ...ground], [...kept, ...ground], seen].map((boxes) => largestGap(boxes, top, bottom));
-    const at = places.findIndex((one) => one.bottom - one.top >= need);
-    const place = places[at];
-    for (const view of views) view.toggleAttribute("data-behind", at === 1 && !!place && boxOf(view).bottom > place.top && boxOf(view).top < place.bottom);
-    if (!place) return false;
-    this.footPx = Math.max(0, Math.round(bottom - place.bottom));
-    this.el.style.setProperty("--urc-lost-height", at === 2 ? "auto" : `${Math.round(place.bottom - place.top)}px`);
+    const places = [[...seen, ...ground], [...kept, ...ground], seen].map((boxes) => lowestGap(boxes, top, bottom, height));
+    const at = places.findIndex((one) => one !== null);
+    const foot = places[at] ?? null;
+    const isCovered = (/** @type {DOMRect} */ box) => foot !== null && box.bottom > foot - height && box.top < foot;
+    for (const view of views) view.toggleAttribute("data-behind", at === 1 && isCovered(boxOf(view)));
+    if (foot === null) return false;
+    this.footPx = Math.max(0, Math.round(bottom - foot));
     this.el.style.setProperty("--urc-lost-foot", `${this.footPx}px`);
     return true;
   }
@@ -171,31 +171,23 @@ function boxOf(el) {
   return el.getBoundingClientRect();
 }
 
-/** Return the height that the card needs, also while it is higher. @param {HTMLElement} card */
-function naturalHeight(card) {
-  const { paddingTop, paddingBottom, borderTopWidth, borderBottomWidth, rowGap } = getComputedStyle(card);
-  const parts = [...card.children].map((one) => boxOf(one).height).filter((height) => height > 0);
-  const edges = [paddingTop, paddingBottom, borderTopWidth, borderBottomWidth].map(parseFloat);
-  return [...parts, ...edges, (parts.length - 1) * parseFloat(rowGap)].reduce((sum, one) => sum + one, 0);
-}
-
 /**
- * Return the largest free height between boxes of a screen, without a gap at each box.
+ * Return the end of the lowest free place between boxes of a screen, without a gap at each box.
  *
  * @param {readonly {top: number, bottom: number}[]} boxes in pixels; empty ones do not count
  * @param {number} top first pixel of the screen that counts
  * @param {number} bottom last pixel of the screen that counts
- * @returns {{top: number, bottom: number}} may be empty
+ * @param {number} height height that is needed, in pixels
+ * @returns {number | null} last pixel of the place; null if no place is high enough
  */
-export function largestGap(boxes, top, bottom) {
-  const sorted = boxes.filter((one) => one.bottom > one.top && one.top < bottom).sort((one, other) => one.top - other.top);
-  let free = { top: bottom, bottom };
-  let from = top;
-  for (const to of [...sorted.map((one) => one.top - GAP_PX), bottom]) {
-    if (to - from > free.bottom - free.top) free = { top: from, bottom: to };
-    for (const one of sorted) if (one.top - GAP_PX <= to) from = Math.max(from, one.bottom + GAP_PX);
+export function lowestGap(boxes, top, bottom, height) {
+  const sorted = boxes.filter((one) => one.bottom > one.top && one.top < bottom).sort((one, other) => other.bottom - one.bottom);
+  let foot = bottom;
+  for (const box of sorted) {
+    if (foot - (box.bottom + GAP_PX) >= height) return foot;
+    foot = Math.min(foot, box.top - GAP_PX);
   }
-  return free;
+  return foot - top >= height ? foot : null;
 }
 
 /**

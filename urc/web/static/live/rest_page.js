@@ -41,15 +41,16 @@ export function watchRest(root, stage, leave, signal) {
 }
 
 /**
- * Name the button by the whole phrase, such as “4 more widgets”; in the bar, it is shorter.
+ * Name the button “4 more widgets”, because the text in the bar comes from the style sheet.
  *
  * @param {HTMLElement} button
  */
 function name(button) {
   const count = Number(getComputedStyle(button).getPropertyValue("--urc-rest-count"));
+  button.parentElement?.toggleAttribute("data-crowded", count > 0);
   if (!count) return; // this screen has all widgets
-  const { restTitleOne = "", restTitleMany = "" } = button.dataset;
-  const title = count === 1 ? restTitleOne : `${count} ${restTitleMany}`;
+  const { restOne = "", restBefore = "", restAfter = "" } = button.dataset;
+  const title = (count === 1 ? restOne : `${restBefore}${count}${restAfter}`).replaceAll("\u00a0", " ");
   button.title = title;
   button.setAttribute("aria-label", title);
 }

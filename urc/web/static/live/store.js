@@ -21,6 +21,7 @@
  *
  * @typedef {{value: Held, alarm: Alarm, timeMs: number, serial: number, image?: Picture, video?: VideoImage}} Sample
  */
+import { priorityOf } from "../core/alarm_signs.js";
 import { SampleHistory } from "./sample_history.js";
 import { digitsIn } from "../core/number_format.js";
 import { ageText, textOf } from "../core/formatting.js";
@@ -301,6 +302,7 @@ export class Store {
       value,
       state,
       alarm: isShown ? sample.alarm : "",
+      priority: isShown ? priorityOf(sample.alarm, sample.value, declared) : "",
       // Computed on demand, because a scan has a thousand numbers that are rarely read as text.
       get text() {
         return textOf(value, signal, factorOf(shown));

@@ -19,6 +19,7 @@
  *
  * @typedef {{words: string, tone: "" | "caution" | "bad"}} Said
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { ageText } from "../core/formatting.js";
 import { said, t } from "../core/words.js";
 
@@ -52,11 +53,11 @@ export function linkWords(robot, nowS) {
  * @param {number} nowS
  */
 function awayWords(seenAt, nowS) {
-  if (seenAt === null) return t("Not connected");
+  if (seenAt === null) return t("Not connected yet");
   const ageS = Math.max(0, nowS - seenAt);
-  if (ageS < 60) return t("Seen just now");
+  if (ageS < 60) return t("Last seen just now");
   const age = ageS > LONGEST_HOURS_S ? t("{n} days", { n: Math.floor(ageS / DAY_S) }) : ageText(ageS);
-  return t("Seen {age} ago", { age });
+  return t("Last seen {age} ago", { age });
 }
 
 /**
@@ -88,5 +89,5 @@ export function whoWords({ holder, latched }) {
 export function alarmWords({ alarms: { count, worst } }) {
   if (count === 0) return null;
   const words = count === 1 ? t("1 alarm") : t("{n} alarms", { n: count });
-  return worst === "high" ? { words: `▲ ${words}`, tone: "bad" } : { words: `◆ ${words}`, tone: "caution" };
+  return { words: `${SIGNS[worst || "low"]} ${words}`, tone: worst === "high" ? "bad" : "caution" };
 }

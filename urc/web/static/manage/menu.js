@@ -6,6 +6,7 @@
  * @typedef {import("./card_words.js").Said} Said
  * @typedef {import("./fleet_poll.js").RobotList} RobotList
  */
+import { SIGNS } from "../core/alarm_signs.js";
 import { alarmWords, batteryWords, linkWords, whoWords } from "./card_words.js";
 import { watchPictures } from "./card.js";
 import { followRobots } from "./fleet_poll.js";
@@ -56,8 +57,6 @@ function take(news) {
 function show(card, robot, nowS) {
   const link = linkWords(robot, nowS);
   card.dataset["state"] = link.state;
-  // “Connect” says enough about a robot that was never connected.
-  card.toggleAttribute("data-unseen", link.state === "off" && robot.seen_at === null);
   card.dataset["alarms"] = String(robot.alarms.count);
   card.dataset["worst"] = robot.alarms.worst;
   put(card, "[data-link]", link);
@@ -89,7 +88,7 @@ function count() {
     const el = button.querySelector("[data-count]");
     if (el) el.textContent = String(figure);
   }
-  document.title = alarms > 0 ? `▲ ${alarms} · ${title}` : title;
+  document.title = alarms > 0 ? `${SIGNS[worstAlarm()]} ${alarms} · ${title}` : title;
 }
 
 /** @param {HTMLElement} card */
@@ -102,6 +101,12 @@ function hasAlarm(card) {
   return Number(card.dataset["alarms"] ?? 0) > 0;
 }
 
+/** Return the highest priority of all alarms. @returns {"low" | "medium" | "high"} */
+function worstAlarm() {
+  const worst = new Set(cards.map((card) => card.dataset["worst"]));
+  return worst.has("high") ? "high" : worst.has("medium") ? "medium" : "low";
+}
+
 /** Show the cards that match the typed words, the filter and the tag. */
 function find() {
   const typed = field instanceof HTMLInputElement ? field.value : "";
@@ -109,7 +114,7 @@ function find() {
   const tag = pressed(tags)?.dataset["tag"] ?? "";
   let found = 0;
   for (const card of cards) {
-    const said = [...card.querySelectorAll("h2, [data-summary]")].map((el) => el.textContent ?? "");
+    const said = [...card.querySelectorAll("h2, [data-summary], .urc-robot-facts")].map((el) => el.textContent ?? "");
     const own = (card.dataset["cardTags"] ?? "").split(" ");
     const isShown =
       fits([card.dataset["robotCard"] ?? "", ...said, ...own.map((one) => `#${one}`)].join(" "), typed) &&

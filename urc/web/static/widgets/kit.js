@@ -10,10 +10,12 @@
  * @typedef {import("../core/types.js").Signal} Signal
  */
 
+import { SIGNS, usualPriority } from "../core/alarm_signs.js";
 import { fixed, rough } from "../core/number_format.js";
 import { Sheet } from "./offscreen_canvas.js";
 import { mark } from "../core/words.js";
 
+export { SIGNS } from "../core/alarm_signs.js";
 export { digitsIn, figure } from "../core/number_format.js";
 export { ageText, inTurn, wordOf } from "../core/formatting.js";
 export { mark, t } from "../core/words.js";
@@ -28,15 +30,15 @@ const SVG = "http://www.w3.org/2000/svg";
  */
 const KEPT_MS = 10_000;
 
-/** Text of an exceeded limit, with a shape and a word, because colour alone is not enough. */
+/** Words of each alarm, without a shape: see `alarmText`. */
 export const ALARMS = Object.freeze({
   "": "",
-  lolo: mark("▲ Very low"),
-  low: mark("◆ Low"),
-  high: mark("◆ High"),
-  hihi: mark("▲ Very high"),
-  minor: mark("◆ Warning"),
-  major: mark("▲ Alarm"),
+  lolo: mark("Very low"),
+  low: mark("Low"),
+  high: mark("High"),
+  hihi: mark("Very high"),
+  minor: mark("Warning"),
+  major: mark("Alarm"),
 });
 
 /**
@@ -292,16 +294,26 @@ export function many(readings) {
 }
 
 /**
- * Return the note for a value: that it is missing, its age, or the exceeded limit.
+ * Return an alarm as text: the shape of its priority, and a word, because colour alone is not enough.
  *
- * @param {Pick<Reading, "state" | "age" | "alarm">} reading
+ * @param {Pick<Reading, "alarm" | "priority">} reading
  * @param {(text: string, names?: Record<string, string | number>) => string} t `t` of the context
  */
-export function noteOf({ state, age, alarm }, t) {
+export function alarmText({ alarm, priority }, t) {
+  return alarm ? `${SIGNS[priority || usualPriority(alarm)]} ${t(ALARMS[alarm])}` : "";
+}
+
+/**
+ * Return the note for a value: that it is missing, its age, or the exceeded limit.
+ *
+ * @param {Pick<Reading, "state" | "age" | "alarm" | "priority">} reading
+ * @param {(text: string, names?: Record<string, string | number>) => string} t `t` of the context
+ */
+export function noteOf({ state, age, alarm, priority }, t) {
   if (state === "none") return t("no value yet");
   if (state === "gone") return t("seen {age} ago", { age });
   const old = state === "stale" ? t("{age} old", { age }) : "";
-  return [alarm ? t(ALARMS[alarm]) : "", old].filter(Boolean).join(" · ");
+  return [alarmText({ alarm, priority }, t), old].filter(Boolean).join(" · ");
 }
 
 /**
@@ -323,15 +335,15 @@ export function faultOf({ type, size }, t) {
  * worst alarm. Missing readings are ignored if others are known.
  *
  * @param {readonly (Reading | undefined)[]} readings
- * @returns {{state: Reading["state"], age: string, alarm: Alarm}}
+ * @returns {Pick<Reading, "state" | "age" | "alarm" | "priority">}
  */
 export function worst(readings) {
   const bound = readings.flatMap((reading) => (reading ? [reading] : []));
   const order = /** @type {const} */ (["stale", "live", "gone"]);
   const found = order.map((state) => bound.find((reading) => reading.state === state)).find(Boolean);
   const alarms = /** @type {const} */ (["hihi", "lolo", "high", "low"]);
-  const alarm = alarms.find((name) => bound.some((reading) => reading.alarm === name)) ?? "";
-  return { state: found?.state ?? "none", age: found?.age ?? "", alarm };
+  const bad = alarms.map((name) => bound.find((reading) => reading.alarm === name)).find(Boolean);
+  return { state: found?.state ?? "none", age: found?.age ?? "", alarm: bad?.alarm ?? "", priority: bad?.priority ?? "" };
 }
 
 /** Offscreen canvases of `board`. @type {WeakMap<HTMLCanvasElement, Sheet>} */
