@@ -83,7 +83,7 @@ class Shell {
     figure(this.el, level, signal.unit ?? "%");
     style(this.full, "--battery-full", full.toFixed(3));
     if (signal !== this.drawn) this.draw(signal, least, most);
-    const said = noteOf(level, this.t).replace(/[▲◆] /, "");
+    const said = noteOf(level, this.t).replace(/^[▲◆◇] /u, "");
     tell(this.meter, {
       "aria-valuemin": String(least),
       "aria-valuemax": String(most),

@@ -45,15 +45,30 @@ export class SmallLegend {
     const isSmall = display === "grid";
     for (const item of items) item.toggleAttribute("data-hidden", false);
     style(list, "--plot-columns", "1"); // as wide as they want to be: a narrow column shortens names
-    let shown = items.length;
+    let [shown, columns] = [items.length, 1];
     if (isSmall && list.clientWidth > 0) {
       const gap = parseFloat(columnGap) || 0;
       const widest = Math.max(1, ...items.map((item) => widthOf(item)));
-      const columns = Math.max(1, Math.floor((list.clientWidth + gap) / (widest + gap)));
+      columns = Math.max(1, Math.floor((list.clientWidth + gap) / (widest + gap)));
       style(list, "--plot-columns", String(columns));
       const room = Math.round(parseFloat(maxHeight) / parseFloat(lineHeight)) * columns;
       if (items.length > room) shown = Math.max(1, room - 1);
     }
+    rest.toggleAttribute("data-wide", false);
+    this.show(items, shown);
+    if (shown === items.length || columns === 1 || shown < 2 || rest.scrollWidth <= rest.clientWidth) return;
+    rest.toggleAttribute("data-wide", true); // its text takes the place of one more entry
+    this.show(items, shown - 1);
+  }
+
+  /**
+   * Show the first entries, and the number of the others.
+   *
+   * @param {readonly Element[]} items
+   * @param {number} shown
+   */
+  show(items, shown) {
+    const { list, rest } = this;
     items.forEach((item, place) => item.toggleAttribute("data-hidden", place >= shown));
     if (shown < items.length) {
       write(rest, this.words(items.length - shown));

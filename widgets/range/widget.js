@@ -100,7 +100,7 @@ class View {
     write(this.symbol, kind === "unknown" || kind === "clear" ? "" : this.unit("range").symbol);
     const sides = places.map((place) => this.t(sideOf(place)));
     const said = sensors.map((each) => this.lossOf(each, bounds));
-    const alarm = noteOf({ state: "live", age: "", alarm: shown.reading.alarm }, this.t);
+    const alarm = noteOf({ ...shown.reading, state: "live", age: "" }, this.t);
     const side = sensors.length > 1 && kind !== "unknown" ? (sides[nearest] ?? "") : "";
     const own = [this.zoneText(shown.value, bounds, kind), side, alarm, this.lossOf(shown, bounds)];
     const notes = [...own, ...besides(sides, said, nearest)];
