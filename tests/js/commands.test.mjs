@@ -8,6 +8,7 @@ import { quality, Trips } from "../../widgets/link/trips.js";
 import { chosen, fileOf } from "../../widgets/log/lines.js";
 import { numberOf } from "../../widgets/number/typed.js";
 import { hexOf, pairsOf, plain, Typed } from "../../widgets/terminal/hex.js";
+import { measured } from "../../urc/web/static/widgets/motion.js";
 
 const VOLTS = { type: "number", title: "", unit: "V", min: 0, max: 10, choices: [], default: null, allowsControl: false };
 
@@ -148,4 +149,10 @@ test("round trips have a middle, a tail and a grade", () => {
   for (const ms of [10, 20, 30, 300]) trips.add(ms);
   assert.deepEqual([trips.share(0.5), trips.share(0.95), trips.late()], [30, 300, 0.25]);
   assert.deepEqual([null, 10, 150, 400].map(quality), ["", "good", "caution", "bad"]);
+});
+
+test("the value of a lever has a sign and the declared unit, and is empty at rest", () => {
+  const lift = { ...VOLTS, name: "lift", unit: "m/s", min: -0.5, max: 2 };
+  assert.deepEqual([0.25, -0.5, 0, 0.001].map((value) => measured(value, lift)), ["+0.50 m/s", "−0.25 m/s", "", ""]);
+  assert.deepEqual([0.25, -1, 0].map((value) => measured(value, undefined)), ["+25 %", "−100 %", ""]);
 });

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { bands, digitsOf, ends, share, spanOf, ticks, wholes } from "../../urc/web/static/widgets/axis_ticks.js";
-import { offset, covers, tape, HIGH } from "../../widgets/altitude/tape.js";
+import { offset, covers, tape, HIGH } from "../../urc/web/static/widgets/height_tape.js";
 import { leanOf, ofQuaternion, solid, wrapped } from "../../widgets/attitude/angles.js";
 import { Mean, cellScale, clock, spread, timeLeft } from "../../widgets/battery/charge.js";
 import { angleOf, bearing, bearingAt, bearingOf, figures, point, turn } from "../../widgets/compass/bearing.js";

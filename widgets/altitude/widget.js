@@ -2,9 +2,8 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Context} Context */
 /** @typedef {import("../../urc/web/static/core/types.js").Instance} Instance */
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
-import { attribute, clamp, drawing, format, noteOf, number, part, style, svg, write } from "urc/kit";
-import { digitsOf } from "urc/axis_ticks";
-import { covers, offset, tape } from "./tape.js";
+import { HeightTape } from "urc/height_tape";
+import { attribute, clamp, drawing, format, noteOf, number, part, style, write } from "urc/kit";
 
 /** Climb below which the flight counts as level, as a fraction of a unit. */
 const LEVEL = 0.05;
@@ -20,7 +19,7 @@ export default {
     const text = part(el, ".altitude-text");
     const unit = part(el, ".altitude-unit");
     const note = part(el, ".altitude-note");
-    const strip = el.querySelector(".altitude-tape") ? new Strip(el, Number(options["span"] ?? 20)) : null;
+    const strip = el.querySelector(".altitude-tape") ? tapeOf(el, options) : null;
     const digits = Number(options["precision"] ?? 1);
 
     return {
@@ -57,39 +56,13 @@ export default {
   },
 };
 
-/** The tape. */
-class Strip {
-  /**
-   * @param {HTMLElement} el
-   * @param {number} span
-   */
-  constructor(el, span) {
-    this.span = span;
-    this.group = drawing(el, ".altitude-tape");
-    this.base = NaN;
-  }
-
-  /** @param {number} value */
-  show(value) {
-    if (!covers(value, this.base, this.span)) this.draw(value);
-    style(this.group, "transform", `translateY(${offset(value, this.base, this.span).toFixed(2)}px)`);
-  }
-
-  /** @param {number} value */
-  draw(value) {
-    const { base, step, rungs } = tape(value, this.span);
-    this.base = base;
-    const digits = digitsOf([step]);
-    const parts = rungs.flatMap((rung) => {
-      const y = rung.y.toFixed(2);
-      const line = svg("path", { class: "altitude-rung", d: `M${rung.isMain ? 56 : 64} ${y}H74` });
-      if (!rung.isMain) return [line];
-      const label = svg("text", { class: "altitude-label", x: 52, y });
-      label.textContent = format(rung.value, digits);
-      return [line, label];
-    });
-    this.group.replaceChildren(...parts);
-  }
+/**
+ * @param {HTMLElement} el
+ * @param {Readonly<Record<string, unknown>>} options
+ */
+function tapeOf(el, options) {
+  const look = { rung: "altitude-rung", label: "altitude-label", right: 74 };
+  return new HeightTape(drawing(el, ".altitude-tape"), Number(options["span"] ?? 20), look);
 }
 
 /**

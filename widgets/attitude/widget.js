@@ -6,6 +6,7 @@
 /** @typedef {import("./angles.js").Lean} Lean */
 import { attribute, mark, noteOf, number, numbers, part, worst, write } from "urc/kit";
 import { DEGREES, leanOf, ofQuaternion } from "./angles.js";
+import { Height } from "./height.js";
 import { viewOf } from "./views.js";
 
 /** Fraction of a limit at which a caution begins. */
@@ -18,17 +19,19 @@ export default {
    * @param {Context} ctx
    * @returns {Instance}
    */
-  mount({ el, options, t }) {
+  mount(ctx) {
+    const { el, options, t } = ctx;
     const root = part(el, ".attitude");
     const words = part(el, ".attitude-words");
     const note = part(el, ".attitude-note");
     const view = viewOf(el, options);
+    const tape = el.querySelector(".attitude-tape") ? new Height(ctx) : null;
     const parts = partsOf(options["view"]);
     const axes = (/** @type {(Reading | undefined)[]} */ readings) =>
       String(options["axes"] ?? readings.find((reading) => reading?.signal.axes)?.signal.axes ?? "FLU");
 
     return {
-      update({ orientation, roll, pitch, yaw }) {
+      update({ orientation, roll, pitch, yaw, height }) {
         const angles = orientation
           ? ofQuaternion(numbers(orientation) ?? [], String(options["order"]))
           : { roll: radians(roll), pitch: radians(pitch), yaw: radians(yaw) };
@@ -44,10 +47,12 @@ export default {
         attribute(root, "data-alarm", own ? (own.isAlarm ? "hihi" : "high") : reading.alarm);
         attribute(root, "data-missing", missing.join(" "));
         view.show(lean);
+        tape?.show(height);
         write(words, wordsOf(lean, missing, t));
         const said = own ? (own.isAlarm ? t("▲ Leans too far") : t("◆ Leans far")) : "";
         const lost = known.length > 0 ? missing.map((name) => `${t(NAMES[name])}: ${lossOf(bound[name], t)}`) : [];
-        write(note, [said, noteOf(reading, t), ...lost].filter(Boolean).join(" · "));
+        const old = tape && height && height.state !== "live" ? `${t("height")}: ${noteOf({ ...height, alarm: "" }, t)}` : "";
+        write(note, [said, noteOf(reading, t), ...lost, old].filter(Boolean).join(" · "));
       },
     };
   },

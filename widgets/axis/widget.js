@@ -5,7 +5,7 @@
 /** @typedef {import("../../urc/web/static/core/types.js").Reading} Reading */
 import { bounded, snapped } from "urc/response_curve";
 import { clamp, part, style, write } from "urc/kit";
-import { DIRECTIONS, Motion, pointed, pulled, signed, speak } from "urc/motion";
+import { DIRECTIONS, Motion, measured, pointed, pulled, speak } from "urc/motion";
 
 /** Half of the thumb's size, which is the margin of the track at either end, in CSS pixels. */
 const MARGIN = 24;
@@ -42,8 +42,9 @@ export default {
 
 class Lever {
   /** @param {Context} ctx */
-  constructor({ el, options, t }) {
+  constructor({ el, options, t, command }) {
     this.t = t;
+    this.argument = command("moved")?.arguments["value"];
     this.el = part(el, ".axis-lever");
     this.track = part(el, ".axis-track");
     this.mark = part(el, ".axis-echo");
@@ -96,7 +97,7 @@ class Lever {
    */
   draw(isHeld, at, value) {
     style(this.track, "--axis-at", at.toFixed(3));
-    const text = signed(value);
+    const text = measured(value, this.argument);
     write(this.value, text);
     write(this.beside, isHeld ? text : "");
     const { t } = this;

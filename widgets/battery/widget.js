@@ -118,6 +118,8 @@ class Cells {
     this.options = options;
     this.t = t;
     this.list = part(el, ".battery-cells");
+    /** The lowest cell, for a cell of the page that is too low for all figures. */
+    this.least = el.querySelector(".battery-least");
     /** @type {HTMLElement[]} */
     this.items = [];
   }
@@ -135,12 +137,14 @@ class Cells {
     const [least, most] = cellScale(signal, this.options);
     const known = values.filter((value) => value !== null);
     const [lowest, highest] = [Math.min(...known), Math.max(...known)];
+    const unit = signal.unit ?? "";
+    const digits = signal.precision ?? (unit === "V" ? 2 : undefined);
+    if (this.least) write(this.least, known.length > 0 ? `▾ ${format(lowest, digits)} ${unit}`.trim() : "—");
     const old = [...(cells ? Array(values.length - each.length).fill(cells.state) : []), ...each.map(({ state }) => state)];
     values.forEach((value, place) => {
       const item = this.items[place];
       if (!item) return;
-      const text = format(value, signal.precision ?? (signal.unit === "V" ? 2 : undefined));
-      write(part(item, ".battery-figure"), text);
+      write(part(item, ".battery-figure"), format(value, digits));
       style(item, "--battery-share", value === null ? "0" : share(value, least, most).toFixed(3));
       const end = value === lowest ? "low" : value === highest ? "high" : "";
       attribute(item, "data-end", known.length > 1 && lowest !== highest ? end : "");
@@ -149,7 +153,6 @@ class Cells {
     const apart = spread(values);
     const most_apart = this.options["imbalance"];
     if (apart === null || typeof most_apart !== "number" || apart <= most_apart) return "";
-    const unit = signal.unit ?? "";
     return this.t("◆ Cells differ by {value}", { value: `${format(apart, signal.precision)} ${unit}`.trim() });
   }
 

@@ -15,8 +15,8 @@ export default {
   mount(ctx) {
     const control = new Switch(ctx);
     return {
-      update({ state }, outputs) {
-        control.update(state, outputs);
+      update({ state, requested }, outputs) {
+        control.update(state, requested, outputs);
       },
     };
   },
@@ -37,13 +37,15 @@ class Switch {
     this.values = valuesOf(ctx);
     /** @type {Reading | undefined} */
     this.state = undefined;
+    /** @type {Reading | undefined} */
+    this.requested = undefined;
     const show = () => this.show();
     this.giver = new CommandState({ give: () => Promise.resolve(), show, t, signal });
     this.wish = new PendingValue({
       withinMs: 1000 * Number(options["echo_s"] ?? 3),
       show,
       signal,
-      isSame: (wished, said) => this.isOn(said) === wished,
+      isSame: (wished, said) => this.isOn(said, this.state) === wished,
     });
     const tap = (/** @type {Element | null} */ button, /** @type {() => boolean} */ wanted) => {
       button?.addEventListener("click", () => void this.turn(wanted()), { signal });
@@ -55,10 +57,12 @@ class Switch {
 
   /**
    * @param {Reading | undefined} state
+   * @param {Reading | undefined} requested
    * @param {Readonly<Record<string, Outlet>>} outputs
    */
-  update(state, outputs) {
+  update(state, requested, outputs) {
     this.state = state;
+    this.requested = requested;
     this.wish.take(state);
     if (outputs["change"]) return this.giver.take(outputs["change"]);
     const [on, off] = [outputs["turn_on"], outputs["turn_off"]];
@@ -66,14 +70,15 @@ class Switch {
   }
 
   /**
-   * Return the robot's state; null if it is neither on nor off.
+   * Return whether a value of a reading means on; null if it means neither on nor off.
    *
    * @param {unknown} said
+   * @param {Reading | undefined} reading
    * @returns {boolean | null}
    */
-  isOn(said) {
+  isOn(said, reading) {
     if (said === null || said === undefined) return null;
-    const [off, on] = this.values.map((value) => wordOf(this.state?.signal, value));
+    const [off, on] = this.values.map((value) => wordOf(reading?.signal, value));
     if (String(said) === on) return true;
     if (String(said) === off) return false;
     if (typeof said === "boolean") return said;
@@ -83,7 +88,25 @@ class Switch {
   /** Displayed state: the requested state if the option is set so, otherwise the robot's state. */
   get shown() {
     if (this.isOptimistic && this.wish.isWaiting) return this.wish.value === true;
-    return this.isOn(this.state?.value);
+    return this.isOn(this.state?.value, this.state);
+  }
+
+  /** Requested state, for robots that do not report their state; null if unknown. */
+  get asked() {
+    return this.isOn(this.requested?.value, this.requested);
+  }
+
+  /**
+   * Return the note below the switch.
+   *
+   * @param {string} missed text about a requested state that the robot did not reach, or ""
+   */
+  noteWith(missed) {
+    const { giver, state, requested } = this;
+    const { t } = this.ctx;
+    if (state) return giver.note(missed, noteOf(state, t));
+    if (this.asked === null) return giver.note() || t("unknown");
+    return giver.note() || [t("requested"), requested ? noteOf(requested, t) : ""].filter(Boolean).join(" · ");
   }
 
   /** @param {boolean} isOn */
@@ -103,9 +126,10 @@ class Switch {
 
   show() {
     const { giver, wish, state, words, shown } = this;
-    const isKnown = this.isOn(state?.value) !== null;
+    const isKnown = this.isOn(state?.value, state) !== null;
     const isLocked = !giver.isReady || giver.isPending;
-    attribute(this.root, "data-state", state?.state ?? "none");
+    attribute(this.root, "data-state", state?.state ?? "unreported");
+    attribute(this.root, "data-asked", this.asked === null ? "no" : "yes");
     attribute(this.root, "data-alarm", state?.alarm ?? "");
     attribute(this.root, "data-phase", giver.phase);
     attribute(this.root, "data-wish", wish.isMissed ? "missed" : wish.isWaiting ? "waiting" : "");
@@ -117,12 +141,15 @@ class Switch {
       if (hadFocus && isMoved) (isKnown ? this.main : this.pair.querySelector("button"))?.focus();
       attribute(this.main, "aria-checked", String(shown === true));
       for (const button of [this.main, ...this.pair.children]) attribute(button, "aria-disabled", String(isLocked));
+      for (const [place, button] of this.requested ? [...this.pair.children].entries() : []) {
+        attribute(button, "aria-pressed", String(this.asked === (place === 1)));
+      }
     }
     const sign = wish.isWaiting ? " …" : wish.isMissed ? " ≠" : "";
     write(this.word, (isKnown ? words[shown ? 1 : 0] ?? "" : state?.text ?? "—") + sign);
     const wished = words[wish.value === true ? 1 : 0] ?? "";
     const missed = wish.isMissed ? this.ctx.t("≠ requested {wish}; the robot reports another value", { wish: wished }) : "";
-    write(this.note, giver.note(missed, state ? noteOf(state, this.ctx.t) : ""));
+    write(this.note, this.noteWith(missed));
   }
 }
 

@@ -33,6 +33,7 @@ class Table {
     this.count = part(el, ".table-count");
     const table = el.querySelector("table");
     if (!table) throw new Error("the template has no table");
+    this.table = table;
     const [room, scroll, more] = [part(el, ".table-room"), part(el, ".table-scroll"), part(el, ".table-more")];
     keepWholeRows({ room, scroll, table, more }, (count) => `▾ ${moreRows(count, ctx)}`, ctx.signal);
     const filter = el.querySelector(".table-filter");
@@ -126,6 +127,7 @@ class Table {
     const words = worse > 0 ? t("{count} not OK", { count: worse }) : isOld ? t("not known") : isOk ? t("all OK") : "";
     write(this.count, this.rows.length === 0 ? "" : words);
     attribute(this.root, "data-alarm", rows.some(({ level }) => level === "error") ? "hihi" : worse > 0 ? "high" : "");
+    style(this.table, "--table-count", String(Math.max(1, rows.length)));
     while (this.body.children.length > Math.max(1, rows.length)) this.body.lastElementChild?.remove();
     rows.forEach((row, place) => {
       const line = this.body.children[place] ?? this.body.appendChild(emptyLine());

@@ -62,6 +62,27 @@ async def test_a_signal_with_words_is_chosen_and_switched_by_what_the_robot_says
         assert await page.locator("[data-wish=missed], [data-wish=waiting]").count() == 0
 
 
+async def test_a_switch_outlines_the_request_of_a_robot_that_reports_no_state(
+    new_page: PageMaker,
+) -> None:
+    """It says “unknown”, then “requested”; both buttons stay, and none claims a state."""
+    change = Command("enable", "wire", WriteSpec("text"), {"on": Argument("on", "boolean")})
+    use = WidgetUse("motors", "switch", {"requested": "asked"}, {"change": "enable"}, {})
+    asked = {"asked": Signal("asked", "boolean", stale_after_s=3600)}
+    robot = FakeRobot(dashboard_profile(signals=asked, uses=[use], commands={"enable": change}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await ready(page, ".switch-on")
+        await until_text(page, ".switch-note", "unknown")
+        robot.set_reading("asked", True)
+        await until_text(page, ".switch-note", "requested")
+        await until_attribute(page, ".switch-on", "aria-pressed", "true")
+        await until_attribute(page, ".switch-off", "aria-pressed", "false")
+        assert not await page.is_visible(".switch-main")
+
+
 async def test_numbers_are_chosen_for_a_robot_that_reports_words(new_page: PageMaker) -> None:
     """Their labels are the robot's words; a word that cannot be chosen is shown too."""
     change = Command("set_mode", "wire", WriteSpec("text"), {"mode": Argument("mode", "integer")})

@@ -219,6 +219,22 @@ async def test_needles_bars_and_tapes_stand_where_the_value_is(new_page: PageMak
         await until_attribute(page, ".attitude", "data-missing", "bank nose")
 
 
+async def test_the_height_next_to_a_horizon_moves_its_tape(new_page: PageMaker) -> None:
+    """In the displayed unit; an unknown height draws no tape."""
+    angles = {"roll": "roll", "pitch": "pitch", "height": "height"}
+    async with shown(new_page, use("attitude", angles, height_span=40)) as (robot, page):
+        for name, value in (("roll", 0.0), ("pitch", 0.0), ("height", 31.25)):
+            robot.set_reading(name, value)
+        await until_text(page, ".attitude-height-text", "31.25")
+        await until_text(page, ".attitude-height-unit", "m")
+        assert await transform(page, ".attitude-heights") == "translateY(-43.75px)"
+        await until_text(page, ".attitude-words", "level")
+        robot.set_reading("height", None)
+        await until_text(page, ".attitude-height-text", "—")
+        assert not await page.is_visible(".attitude-heights")
+        await until_text(page, ".attitude-words", "level")
+
+
 async def test_an_attitude_without_one_of_its_angles_is_not_level(new_page: PageMaker) -> None:
     """What is bound and not known is named, and whatever would be drawn of it is hidden."""
     angles = {"roll": "roll", "pitch": "pitch"}

@@ -21,6 +21,7 @@ BATTERY = """() => {
       .filter((one) => one.offsetHeight).length,
   };
 }"""
+LEAST_BAR_PX = 4
 SPEEDS = """() => [...document.querySelectorAll(".joystick .urc-speed, .joystick .urc-speed-next")]
   .filter((one) => {
     const [box, range] = [one.getBoundingClientRect(), document.createRange()];
@@ -74,6 +75,27 @@ async def test_a_battery_in_a_wider_cell_is_no_smaller(
         battery = await page.evaluate(BATTERY)
     assert battery["picture"] >= 0.3
     assert battery["facts"] == (3 if width > 200 else 0)
+
+
+async def test_modules_in_a_chip_have_bars_and_the_lowest_voltage(new_page: PageMaker) -> None:
+    """Seven bars that can be seen, next to the figure of the weakest module."""
+    names = [f"module_{number}" for number in range(7)]
+    signals = {name: Signal(name, unit="V", precision=2) for name in names}
+    battery = WidgetUse("battery", "battery", lists={"modules": tuple(names)})
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=[battery]))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await page.eval_on_selector(".urc-cell", SIZE, [153, 68])
+        for number, name in enumerate(names):
+            robot.set_reading(name, 4.1 - number / 100)
+        await expect(page.locator(".battery-least")).to_have_text("▾ 4.04 V")
+        widths = await page.locator(".battery-bar").evaluate_all(
+            "(bars) => bars.map((bar) => bar.getBoundingClientRect().width)"
+        )
+    assert len(widths) == len(names)
+    assert min(widths) >= LEAST_BAR_PX
 
 
 @pytest.mark.parametrize("width", [260, 310, 345, 410])

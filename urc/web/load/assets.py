@@ -30,6 +30,7 @@ KIT = (
     "gamepad_map",
     "colour_map",
     "axis_ticks",
+    "height_tape",
     "offscreen_canvas",
     "path_simplify",
 )

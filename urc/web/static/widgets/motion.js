@@ -225,15 +225,36 @@ export function waysOf(axis, argument) {
  * @param {Context["t"]} t
  */
 export function directed(axis, value, argument, t) {
+  const { isBack, text } = amount(value, argument);
+  if (!text) return "";
+  const [ahead, back] = waysOf(axis, argument);
+  const way = argument?.title ? `${argument.title} ${isBack ? "−" : "+"}` : `${t(isBack ? back : ahead)} `;
+  return way + text;
+}
+
+/**
+ * Return a value with its sign and the declared unit, such as "+0.18 m/s"; "" at rest.
+ *
+ * @param {unknown} value from -1 to 1
+ * @param {import("../core/types.js").Argument | undefined} argument argument that the control sets
+ */
+export function measured(value, argument) {
+  const { isBack, text } = amount(value, argument);
+  return text && `${isBack ? "−" : "+"}${text}`;
+}
+
+/**
+ * @param {unknown} value from -1 to 1
+ * @param {import("../core/types.js").Argument | undefined} argument
+ * @returns {{isBack: boolean, text: string}} `text` has no sign; "" at rest
+ */
+function amount(value, argument) {
   const share = typeof value === "number" ? value : 0;
   const reach = share < 0 ? -(argument?.min ?? -1) : (argument?.max ?? 1);
   const size = Math.abs(share) * Math.abs(reach);
   const digits = Math.abs(reach) < 20 ? 2 : 0;
   const figure = argument?.unit ? size.toFixed(digits) : Math.round(Math.abs(share) * 100).toFixed(0);
-  if (Number(figure) === 0) return "";
-  const [ahead, back] = waysOf(axis, argument);
-  const way = argument?.title ? `${argument.title} ${share < 0 ? "−" : "+"}` : `${t(share < 0 ? back : ahead)} `;
-  return `${way}${figure} ${argument?.unit || "%"}`;
+  return { isBack: share < 0, text: Number(figure) === 0 ? "" : `${figure} ${argument?.unit || "%"}` };
 }
 
 /**

@@ -1,11 +1,12 @@
 // @ts-check
 /**
- * A tape that moves past a mark. Pure.
+ * A tape of heights that moves past a mark.
  *
  * The tape is drawn for three times the visible range, and then only moved. It is redrawn when the mark
  * approaches an end.
  */
-import { wholes } from "urc/axis_ticks";
+import { digitsOf, wholes } from "./axis_ticks.js";
+import { format, style, svg } from "./kit.js";
 
 /** Height of the drawing, in its own units. */
 export const HIGH = 200;
@@ -49,6 +50,47 @@ export function covers(value, base, span) {
  */
 export function offset(value, base, span) {
   return ((value - base) / span) * HIGH;
+}
+
+/** The tape in a drawing of 200 units of height, with y = 0 at the mark. */
+export class HeightTape {
+  /**
+   * @param {SVGElement} group element of the drawing that the tape fills
+   * @param {number} span visible range, in the displayed unit
+   * @param {object} look
+   * @param {string} look.rung class of the rungs
+   * @param {string} look.label class of the labels
+   * @param {number} look.right x of the right end of the rungs
+   */
+  constructor(group, span, look) {
+    this.group = group;
+    this.span = span;
+    this.look = look;
+    this.base = NaN;
+  }
+
+  /** @param {number} value in the displayed unit */
+  show(value) {
+    if (!covers(value, this.base, this.span)) this.draw(value);
+    style(this.group, "transform", `translateY(${offset(value, this.base, this.span).toFixed(2)}px)`);
+  }
+
+  /** @param {number} value */
+  draw(value) {
+    const { rung, label, right } = this.look;
+    const { base, step, rungs } = tape(value, this.span);
+    this.base = base;
+    const digits = digitsOf([step]);
+    const parts = rungs.flatMap((one) => {
+      const y = one.y.toFixed(2);
+      const line = svg("path", { class: rung, d: `M${right - (one.isMain ? 18 : 10)} ${y}H${right}` });
+      if (!one.isMain) return [line];
+      const text = svg("text", { class: label, x: right - 22, y });
+      text.textContent = format(one.value, digits);
+      return [line, text];
+    });
+    this.group.replaceChildren(...parts);
+  }
 }
 
 /** @param {number} span */
