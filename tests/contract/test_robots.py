@@ -29,7 +29,7 @@ SHARED = sorted([*FOLDER.glob("drivers/*.yaml"), *FOLDER.glob("interfaces/*.yaml
 
 ON_THE_WAY = {"plan", "plan_frame", "map_plan", "goal_x", "goal_y", "waypoint"}
 """Signals that a robot has only while it drives by itself; see `test_worlds`."""
-GIVEN = {"kept", "servo"}
+GIVEN = {"kept", "servo", "motors_requested"}
 """Signals that only commands set; see `test_arm`."""
 LISTENED_S = 20.0
 """How long the emulated robot is listened to: more than twice the slowest poll."""
