@@ -12,6 +12,7 @@ reports on standard output::
 Orders on standard input, one per line, with times in milliseconds::
 
     delay MS | jitter MS | loss PERCENT
+    rate KBIT               what each side can send, in kbit/s; 0 for no limit
     cut | heal              the whole link
     cut a | cut b           only packets from that side
     cut PORT | heal PORT    only packets from or to that TCP or UDP port
@@ -43,6 +44,9 @@ ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
 DEVICE = b"tun0"
 MOST_WAITING = 4096
 """Largest number of packets in transit; additional packets are lost, as on any link."""
+MOST_QUEUED_NS = 1_000_000_000
+"""Longest wait for a link with a rate, as in the buffers of many modems; further packets are lost.
+"""
 
 
 @dataclass
@@ -64,6 +68,10 @@ class Weather:
     delay_ns: int = 0
     jitter_ns: int = 0
     loss: float = 0.0
+    bit_ns: float = 0.0
+    """Time that a side needs to send one bit, in nanoseconds; 0 for a link without a rate."""
+    free_ns: dict[str, int] = field(default_factory=lambda: {"a": 0, "b": 0})
+    """Time at which a side has sent all its packets, keyed by side."""
     is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
     """Whether all packets that a side sends are lost, keyed by side."""
     ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
@@ -149,12 +157,26 @@ class Relay:
             lost = lost or not weather.ports[side.name].isdisjoint(ports_of(packet))
             if lost or (weather.loss and self._dice.random() < weather.loss):
                 continue
-            due_ns = time.monotonic_ns() + weather.delay_ns
+            sent_ns = self._sent_ns(side.name, len(packet))
+            if sent_ns is None:
+                continue
+            due_ns = sent_ns + weather.delay_ns
             if weather.jitter_ns:
                 due_ns += self._dice.randrange(weather.jitter_ns)
             self._numbers += 1
             other = "b" if side.name == "a" else "a"
             heapq.heappush(self._waiting, (due_ns, self._numbers, other, packet))
+
+    def _sent_ns(self, name: str, size: int) -> int | None:
+        """Return when a side has sent a packet of `size` bytes; None if the packet is lost."""
+        weather, now_ns = self.weather, time.monotonic_ns()
+        if not weather.bit_ns:
+            return now_ns
+        begins_ns = max(now_ns, weather.free_ns[name])
+        if begins_ns - now_ns > MOST_QUEUED_NS:
+            return None
+        weather.free_ns[name] = begins_ns + round(8 * size * weather.bit_ns)
+        return weather.free_ns[name]
 
     def _deliver(self) -> None:
         now_ns = time.monotonic_ns()
@@ -182,6 +204,9 @@ class Relay:
             weather.jitter_ns = int(float(what) * 1e6)
         elif verb == "loss":
             weather.loss = float(what) / 100
+        elif verb == "rate":
+            kbit = float(what)
+            weather.bit_ns = 1e6 / kbit if kbit else 0.0
         elif verb in ("down", "up"):
             switch(self._sides[what], DEVICE, is_up=verb == "up")
         elif what.isdigit():
