@@ -90,6 +90,9 @@ class PortSocket:
         """Pass each message of the page to `sink` first."""
         self._sink = sink
 
+    def notify(self, freed: Callable[[], None]) -> None:
+        """Do nothing, because a port never pauses."""
+
     def hold_back(self, is_held: bool) -> None:
         """Do nothing: the page samples its input once a frame, and a worker keeps up with that."""
 

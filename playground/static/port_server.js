@@ -71,6 +71,11 @@ export function openSocket(url) {
   return new PortSocket(url);
 }
 
+/** Return null: images come over the page's only socket. @returns {Worker | null} */
+export function pictureWorker() {
+  return null;
+}
+
 /**
  * @param {string} path
  * @param {RequestInit} how

@@ -106,7 +106,7 @@ FAMILIES: Mapping[str, Family] = {
     "camera": Family(
         "Keys of camera transports",
         "Keys of a camera that sends H.264 or H.265.",
-        _driver("camera cameraAuth"),
+        _driver("camera cameraStreams cameraAuth"),
         {"transports/camera.md": "Cameras with H.264"},
     ),
     "websocket": Family(

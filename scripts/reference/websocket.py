@@ -22,7 +22,7 @@ def page() -> str:
     sent = typing.get_args(client_messages.ClientMessage)
     received = typing.get_args(server_messages.ServerMessage)
     lines += ["## From a client to the server", ""]
-    for one in (*sent, client_messages.JoinRedundant):
+    for one in (*sent, client_messages.JoinRedundant, client_messages.JoinPictures):
         lines += _message(one, _right(one))
     lines += ["## From the server to a client", ""]
     for one in received:

@@ -4,8 +4,10 @@ Playwright's sync API leaves a running loop in the main thread, which breaks eve
 follows in the process. So the tests use its async API, on the one loop of the session.
 """
 
-from collections.abc import AsyncIterator, Callable
+import shlex
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import Literal
 
 from playwright.async_api import Browser, ConsoleMessage, Error, Page, Request, async_playwright
@@ -58,15 +60,23 @@ _WHOLE, _SHELL = (
 
 
 @asynccontextmanager
-async def running_browser(*flags: str, is_whole: bool = False) -> AsyncIterator[Browser]:
+async def running_browser(
+    *flags: str, is_whole: bool = False, inside: Sequence[str] = (), wrapper: Path | None = None
+) -> AsyncIterator[Browser]:
     """Start Chromium headless; it ends with the context.
 
     Args:
         flags: more of them, if need be.
         is_whole: the one that people have. Else the one without windows, in which a page takes half
             the time, and in which frames have no processes of their own, and devices no sensors.
+        inside: command prefix that starts it in another network namespace.
+        wrapper: file for the script that does so.
     """
     found = _WHOLE.find() if is_whole else _SHELL.find() or _WHOLE.find()
+    if wrapper is not None:
+        wrapper.write_text(f'#!/bin/sh\nexec {shlex.join([*inside, str(found)])} "$@"\n', "ascii")
+        wrapper.chmod(0o700)
+        found = str(wrapper)
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
             executable_path=found, args=[*FLAGS, *flags], timeout=60_000

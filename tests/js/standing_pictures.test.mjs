@@ -112,3 +112,20 @@ test("a video without the key is not compared", () => {
   for (const number of [1, 2, 3]) assert.equal(film(number, 2000 * number).firstNumber, undefined);
   assert.ok(worker.posted.every(({ isCompared }) => isCompared === false));
 });
+
+test("a standing picture stays one after a change of the stream, until keyframes show motion", () => {
+  const since = { number: 3, timeMs: 0 };
+  const still = new StandingPictures();
+  still.inherit(since);
+  for (const timeMs of [5000, 6000, 7000]) {
+    still.add(keyframe(1, timeMs));
+    assert.deepEqual(still.first(timeMs, AFTER_MS), since);
+  }
+  const moving = new StandingPictures();
+  moving.inherit(since);
+  const found = [5000, 6000, 7000].map((timeMs, place) => {
+    moving.add(keyframe(place, timeMs));
+    return moving.first(timeMs, AFTER_MS);
+  });
+  assert.deepEqual(found, [since, since, null]);
+});

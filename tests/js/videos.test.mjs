@@ -8,6 +8,8 @@ const { frameOf } = await import("../../urc/web/static/live/frames.js");
 const { Store } = await import("../../urc/web/static/live/store.js");
 const { Videos } = await import("../../urc/web/static/live/videos.js");
 
+const LOW = 2 ** 31;
+
 class FakeWorker extends EventTarget {
   constructor() {
     super();
@@ -35,7 +37,7 @@ class Bitmap {
 }
 
 /** Return a message as the server encodes it. */
-function unit({ number = 7, ageMs = 40, sentMs = 1000, isKey = true, codec = "avc1.42E01E", index = 0, data = [1, 2] }) {
+function unit({ number = 7, ageMs = 40, sentMs = 1000, isKey = true, isSparse = false, codec = "avc1.42E01E", index = 0, data = [1, 2] }) {
   const message = new DataView(new ArrayBuffer(25 + codec.length + data.length));
   message.setUint8(0, 2);
   message.setUint8(1, codec.length);
@@ -45,7 +47,7 @@ function unit({ number = 7, ageMs = 40, sentMs = 1000, isKey = true, codec = "av
   message.setUint32(16, number);
   message.setUint16(20, 640);
   message.setUint16(22, 480);
-  message.setUint8(24, isKey ? 1 : 0);
+  message.setUint8(24, (isKey ? 1 : 0) + (isSparse ? 4 : 0));
   [...codec].forEach((letter, place) => message.setUint8(25 + place, letter.charCodeAt(0)));
   data.forEach((byte, place) => message.setUint8(25 + codec.length + place, byte));
   const frame = frameOf(message.buffer);
@@ -71,7 +73,7 @@ test("an access unit is read as the server wrote it", () => {
   const { type, video, number, bytes, ageMs } = unit({ number: 70000, ageMs: 1234, isKey: false });
   assert.deepEqual([type, ageMs, [...bytes]], ["avc1.42E01E", 1234, [1, 2]]);
   assert.equal(number, 70000);
-  assert.deepEqual(video, { width: 640, height: 480, isKey: false });
+  assert.deepEqual(video, { width: 640, height: 480, isKey: false, isSparse: false });
   assert.equal(frameOf(new ArrayBuffer(20)), null);
 });
 
@@ -178,4 +180,20 @@ test("a video that is not shown ends in the worker", () => {
   worker.says({ signal: "eye", number: 1, bitmap });
   assert.ok(bitmap.isClosed);
   assert.equal(store.reading("eye", 1000).state, "none");
+});
+
+test("the page knows what a slow line leaves out", () => {
+  const { store, worker, videos } = page();
+  const quality = (/** @type {number} */ number, /** @type {any} */ more) => {
+    videos.take(unit({ number, ...more }), 1000);
+    worker.says({ signal: "eye", number, bitmap: new Bitmap() });
+    return store.reading("eye", 1000).video?.quality;
+  };
+  assert.deepEqual(quality(7, {}), { isLow: false, isSparse: false, of: 0 });
+  assert.deepEqual(quality(20, { isSparse: true }), { isLow: false, isSparse: true, of: 0 });
+  assert.deepEqual(quality(50, { isSparse: true }), { isLow: false, isSparse: true, of: 30 });
+  assert.deepEqual(quality(LOW + 5, { isSparse: true }), { isLow: true, isSparse: true, of: 0 });
+  assert.deepEqual(quality(LOW + 6, { isKey: false }), { isLow: true, isSparse: false, of: 0 });
+  assert.deepEqual(quality(51, {}), { isLow: false, isSparse: false, of: 0 });
+  assert.equal(videos.times.get("eye")?.size, 0);
 });

@@ -10,7 +10,7 @@ redacts secret settings in all incoming data.
 
 import asyncio
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, Literal, TypeAlias
@@ -308,12 +308,23 @@ class Hub:
         """Images that a camera repeats; empty unless a signal declares ``frozen_after``."""
         self.streams = SampleHistory()
         """Recent readings of the signals that keep every reading; empty by default."""
+        self.low_streams: Mapping[str, Collection[str]] = {}
+        """Signals of each camera with a second stream for slow lines, keyed by transport."""
+        self.on_low: Callable[[str, bytes], None] | None = None
+        """Function that receives the signal and each access unit of a low stream. Only pages need
+        these units; readings, recordings and programs have those of the other stream."""
         self._latest: dict[str, Sample] = {}
         self._changed: dict[str, int] = {}
         self._wakers: set[Callable[[], None]] = set()
         self._sinks: list[Callable[[Sequence[Sample]], None]] = []
         self._taps: set[EventTap] = set()
         self._traffic_taps: set[EventTap] = set()
+
+    def take_low(self, transport: str, value: object) -> None:
+        """Pass on an access unit of the low stream of a camera, for all its signals."""
+        if self.on_low is not None and isinstance(value, bytes):
+            for name in self.low_streams.get(transport, ()):
+                self.on_low(name, value)
 
     def publish(self, samples: Iterable[Sample]) -> None:
         """Store readings; a repeated value counts as a change, because its time is new."""

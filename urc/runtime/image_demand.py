@@ -6,6 +6,8 @@ again for the next viewer. The robot remains connected: a topic is paused only w
 topic of the same connection delivers messages. If the connection falls silent after a pause, URC
 subscribes to all its topics and never pauses them again in this session. A transport of the type
 `camera` is paused as a whole: it closes its connection until the next viewer.
+
+A camera may have a low stream for pages on slow lines. URC opens it for its first viewer only.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,8 +20,10 @@ from urc.model.values import Value
 from urc.protocol.forms.topics import ReadTopic, read_topics
 from urc.runtime.clock import Clock, within
 from urc.runtime.hub import Hub
+from urc.runtime.image_viewers import low_stream
+from urc.transports.base import LOW_STREAM
 
-__all__ = ["PAUSE_AFTER_S", "ImageDemand", "PausableTopics", "pausable_topics"]
+__all__ = ["PAUSE_AFTER_S", "ImageDemand", "PausableTopics", "low_streams", "pausable_topics"]
 
 PAUSE_AFTER_S: Final = 2.0
 """Time without viewers before a topic is paused, so that a page can swap two cameras quickly."""
@@ -65,26 +69,39 @@ def pausable_topics(driver: Driver, settings: Mapping[str, Value]) -> dict[str, 
         if one.type in _IMAGES and name not in used and one.limits.is_empty
         if 0 < one.stale_after_s <= MAX_LIVE_S
     }
-    found = {}
+    found, lows = {}, low_streams(driver)
     for name, spec in driver.transports.items():
         if spec.type in _CAMERAS:
-            messages = [one for one in driver.messages.values() if one.transport == name]
-            fields = frozenset(field for one in messages for field in one.read.fields)
-            if fields and fields <= images:
-                found[name] = PausableTopics({"": fields}, frozenset(), 0.0)
+            fields = _fields_of(driver, name)
+            topics = {"": fields} if fields and fields <= images else {}
+            if name in lows:
+                topics[LOW_STREAM] = frozenset(map(low_stream, lows[name]))
+            if topics:
+                found[name] = PausableTopics(topics, frozenset(), 0.0)
         elif spec.type in _TRANSPORTS:
-            topics = read_topics(driver, name, settings)
-            paused = {topic: one.fields for topic, one in topics.items() if _may(one, images)}
+            read = read_topics(driver, name, settings)
+            paused = {topic: one.fields for topic, one in read.items() if _may(one, images)}
             others = {
-                field
-                for topic, one in topics.items()
-                if topic not in paused
-                for field in one.fields
+                field for topic, one in read.items() if topic not in paused for field in one.fields
             }
             if paused and others:
                 fresh_s = spec.stale_after_s or PAUSE_AFTER_S
                 found[name] = PausableTopics(paused, frozenset(others), fresh_s)
     return found
+
+
+def low_streams(driver: Driver) -> dict[str, frozenset[str]]:
+    """Return the signals of each camera with a low stream, keyed by transport."""
+    return {
+        name: _fields_of(driver, name)
+        for name, spec in driver.transports.items()
+        if spec.type in _CAMERAS and spec.options.get("streams")
+    }
+
+
+def _fields_of(driver: Driver, transport: str) -> frozenset[str]:
+    messages = [one for one in driver.messages.values() if one.transport == transport]
+    return frozenset(field for one in messages for field in one.read.fields)
 
 
 def _may(topic: ReadTopic, images: set[str]) -> bool:
@@ -151,8 +168,10 @@ class ImageDemand:
                 self._resume((transport, topic))
         if self._since_s.get(transport) != status.since_s:
             self._since_s[transport] = status.since_s
-            # A new connection starts with all topics subscribed.
+            # A new connection starts with all topics subscribed, and without the low stream.
             self._paused = {one for one in self._paused if one[0] != transport}
+            if LOW_STREAM in self._topics[transport].images:
+                self._paused.add((transport, LOW_STREAM))
         return status.state == "live"
 
     def _check_topic(self, place: tuple[str, str], signals: frozenset[str], now_s: float) -> None:

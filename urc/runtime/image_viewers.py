@@ -9,11 +9,19 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 
-__all__ = ["GLANCE_S", "ImageViewers"]
+__all__ = ["GLANCE_S", "ImageViewers", "low_stream"]
 
 GLANCE_S = 15.0
 """Time for which a glance counts as a viewer, in seconds. A menu asks for each card's image every
 few seconds, and a program may ask for single images."""
+
+
+_LOW = "#low"
+
+
+def low_stream(name: str) -> str:
+    """Return the key of the viewers of a video's low stream; no signal has this name."""
+    return name + _LOW
 
 
 class ImageViewers:
@@ -61,7 +69,10 @@ class ImageViewers:
                 self.remove(names)
 
     def sees(self, names: Iterable[str], now_s: float) -> bool:
-        """Return whether one of the signals has a viewer."""
-        return bool(self._of_all) or any(
-            name in self._counts or self._glances.get(name, now_s) > now_s for name in names
+        """Return whether one of the streams has a viewer; a viewer of all sees no low stream."""
+        return any(
+            name in self._counts
+            or self._glances.get(name, now_s) > now_s
+            or (self._of_all and not name.endswith(_LOW))
+            for name in names
         )

@@ -34,6 +34,7 @@ from urc.runtime.link_report import LinkReport
 from urc.runtime.output_buffer import STUCK_S, OutputBuffer
 from urc.transports.arrival_check import ArrivalCheck
 from urc.transports.base import (
+    LOW_STREAM,
     NOTICE,
     TOPICS,
     Prompt,
@@ -463,6 +464,9 @@ class Link:
             self._has_news = True
         if isinstance(data, Envelope) and data.verb == NOTICE:
             self._report.log("warning", "notice", str(data.body))
+            return
+        if isinstance(data, Envelope) and data.verb == LOW_STREAM:
+            self._hub.take_low(self._name, data.body)
             return
         if isinstance(data, Envelope) and data.verb == RESTARTED:
             if data.body:

@@ -16,13 +16,12 @@ from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.problems import UrcError
 
-__all__ = ["check_hosts", "is_near"]
+__all__ = ["check_hosts", "is_near", "urls_of"]
 
 _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|loopback)", re.I)
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
 """Pattern of a fixed beginning that makes a host local, regardless of the setting after it."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
-_OPTIONS: Final = ("host", "url")
 
 
 def is_near(host: str) -> bool:
@@ -40,6 +39,18 @@ def is_near(host: str) -> bool:
     return address.is_loopback or address.is_link_local or address.is_unspecified
 
 
+def urls_of(options: Mapping[str, object]) -> list[object]:
+    """Return the URLs of a transport, as text or templates; a camera may have two streams."""
+    streams = options.get("streams")
+    more = streams.values() if isinstance(streams, Mapping) else ()
+    return [one for one in (options.get("url"), *more) if one is not None]
+
+
+def _text(value: object) -> str:
+    source = value.source if isinstance(value, Template) else value
+    return source if isinstance(source, str) else ""
+
+
 def check_hosts(profile: Profile) -> None:
     """Raise `UrcError` if a package's document names this machine as a fixed host."""
     for spec in profile.driver.transports.values():
@@ -55,20 +66,17 @@ def check_hosts(profile: Profile) -> None:
 
 def _is_listener(spec: TransportSpec) -> bool:
     """Return whether the URL is an address of this machine at which a camera's data arrives."""
-    url = spec.options.get("url")
-    text = url.source if isinstance(url, Template) else url
-    return spec.type == "camera" and isinstance(text, str) and text.lower().startswith("udp://")
+    texts = [_text(url) for url in urls_of(spec.options)]
+    return spec.type == "camera" and all(one.lower().startswith("udp://") for one in texts)
 
 
 def _fixed(options: Mapping[str, object]) -> str:
     """Return a local host that does not depend on a setting, or ""."""
-    for name in _OPTIONS:
-        value = options.get(name)
-        text = value.source if isinstance(value, Template) else value
-        if not isinstance(text, str):
-            continue
-        found = _URL.match(text) if name == "url" else None
-        host = found["host"] if found else text
+    hosts = [_text(options.get("host"))]
+    for text in map(_text, urls_of(options)):
+        found = _URL.match(text)
+        hosts.append(found["host"] if found else text)
+    for host in hosts:
         if "{{" in host:
             if not host.startswith("{{") and _BEGINS.match(host):
                 return host

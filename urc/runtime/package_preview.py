@@ -17,7 +17,7 @@ from urc.expressions import Template
 from urc.model.driver import TransportSpec
 from urc.model.profile import Profile
 from urc.problems import ProblemsError, UrcError
-from urc.runtime.local_hosts import check_hosts
+from urc.runtime.local_hosts import check_hosts, urls_of
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.widget_registry import widget_folder_of
 from urc.shipped import shipped
@@ -167,7 +167,7 @@ def _risks_of_transport(spec: TransportSpec, profile: Profile) -> Iterator[str]:
         yield phrase(
             "{line} runs a program on the machine it logs in to: {text}", line=spec.name, text=text
         )
-    if host := _fixed_host(options):
+    for host in _fixed_hosts(options):
         is_beyond = bool(spec.tunnel) and _LOOPBACK.match(host) is not None
         if not is_beyond:
             yield phrase("{line} connects to a fixed host: {host}", line=spec.name, host=host)
@@ -190,17 +190,16 @@ def _own(value: Any, profile: Profile) -> str:
     return f"{value.source} ({said})" if said else value.source
 
 
-def _fixed_host(options: Mapping[str, object]) -> str:
-    """Return the fixed host of a transport, or "" if the host depends on settings."""
-    host, url = options.get("host"), options.get("url")
+def _fixed_hosts(options: Mapping[str, object]) -> list[str]:
+    """Return the fixed hosts of a transport, without those that depend on settings."""
+    host = options.get("host")
     text = host.source if isinstance(host, Template) and not host.settings else host
     if isinstance(text, str):
-        return text
-    source = url.source if isinstance(url, Template) else url
-    if not isinstance(source, str):
-        return ""
-    found = _URL_HOST.match(source)
-    return found["host"] if found and "{{" not in found["host"] else ""
+        return [text]
+    sources = (url.source if isinstance(url, Template) else url for url in urls_of(options))
+    matches = (_URL_HOST.match(source) for source in sources if isinstance(source, str))
+    hosts = (found["host"] for found in matches if found)
+    return [one for one in dict.fromkeys(hosts) if "{{" not in one]
 
 
 _NOT_WIRE: Final = (

@@ -29,7 +29,7 @@ from urc.runtime.dispatcher import Dispatcher
 from urc.runtime.grid_encoder import GridEncoder
 from urc.runtime.held_commands import is_lossy
 from urc.runtime.hub import TRANSPORT, Hub, LogEntry
-from urc.runtime.image_demand import ImageDemand, pausable_topics
+from urc.runtime.image_demand import ImageDemand, low_streams, pausable_topics
 from urc.runtime.link import Link
 from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
@@ -177,6 +177,7 @@ class Session:
 
     def _made_links(self, table: Table, random: Callable[[], float]) -> dict[str, Link]:
         driver = without(self.profile.driver, self.absent)
+        self.hub.low_streams = low_streams(driver)
         transports: Mapping[str, Transport]
         self._goals = GoalReports(())  # used without a backend
         if self.backend is not None:

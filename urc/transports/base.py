@@ -15,6 +15,7 @@ from urc.problems import UrcError
 
 __all__ = [
     "GoalRecord",
+    "LOW_STREAM",
     "NOTICE",
     "TOPICS",
     "ByteStream",
@@ -51,6 +52,10 @@ NOTICE: Final = "notice"
 one line of text about an error that the robot does not report. Notices are written to the robot's
 log and do not prove that the robot is alive.
 """
+
+LOW_STREAM: Final = "low-stream"
+"""The verb of an envelope with an access unit of a camera's low stream. Requests to open or close
+this stream have it as their topic."""
 
 TOPICS: Final = "topics"
 """The verb of a request for the robot's topics, and of the answer, which the transport itself

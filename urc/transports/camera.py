@@ -8,7 +8,7 @@ from importlib.util import find_spec
 
 from urc._extras import missing
 from urc.transports.base import MissingPackage, Transport, TransportSetup
-from urc.transports.camera_options import read_options
+from urc.transports.camera_options import read_low_options, read_options
 
 __all__ = ["from_setup"]
 
@@ -20,11 +20,16 @@ def from_setup(setup: TransportSetup) -> Transport:
         TransportError: an option is missing or invalid.
         MissingPackage: the library is not installed.
     """
-    options = read_options(setup)
-    if options.scheme == "whep" and find_spec("aiortc") is None:
+    options, low = read_options(setup), read_low_options(setup)
+    schemes = {options.scheme, low.scheme if low is not None else options.scheme}
+    if "whep" in schemes and find_spec("aiortc") is None:
         raise MissingPackage(missing("camera with WHEP needs", "aiortc", "whep"))
     if find_spec("av") is None:
         raise MissingPackage(missing("camera needs", "av", "video"))
     from urc.transports.camera_transport import CameraTransport
 
-    return CameraTransport(options)
+    if low is None:
+        return CameraTransport(options)
+    from urc.transports.camera_streams import TwoStreamCamera
+
+    return TwoStreamCamera(CameraTransport(options), CameraTransport(low))

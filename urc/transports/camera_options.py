@@ -1,5 +1,6 @@
 """The options of the camera transport, for cameras that send H.264 or H.265."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 from urllib.parse import urlsplit
 
@@ -7,7 +8,7 @@ from urc.transports._tls import Tls
 from urc.transports.base import TransportError, TransportSetup
 from urc.transports.web_origin import Credentials, OptionReader, WebOrigin
 
-__all__ = ["CameraOptions", "read_options"]
+__all__ = ["CameraOptions", "main_url", "read_low_options", "read_options"]
 
 _RTSP_PORT, _RTSPS_PORT = 554, 322
 _SCHEMES = ("rtsp", "rtsps", "http", "https", "udp", "whep", "wheps")
@@ -37,9 +38,32 @@ class CameraOptions(NamedTuple):
         return f"camera {self.scheme}{'s' * place.is_secure}://{place.authority}{place.path}"
 
 
+def main_url(options: Mapping[str, object]) -> object:
+    """Return the URL of a camera's only stream, or of its high stream."""
+    streams = options.get("streams")
+    return streams.get("high") if isinstance(streams, Mapping) else options.get("url")
+
+
+def read_low_options(setup: TransportSetup) -> CameraOptions | None:
+    """Return the options of the low stream; None for a camera without one.
+
+    Raises:
+        TransportError: an option is invalid.
+    """
+    streams = setup.options.get("streams")
+    if not isinstance(streams, Mapping):
+        return None
+    options = {**setup.options, "streams": None, "url": streams.get("low")}
+    return read_options(setup._replace(options=options))
+
+
 def read_options(setup: TransportSetup) -> CameraOptions:
-    """Return the options of a camera transport; raise `TransportError` for an invalid option."""
-    options = OptionReader("camera", setup.options)
+    """Return the options of a camera's only stream, or of its high stream.
+
+    Raises:
+        TransportError: an option is invalid.
+    """
+    options = OptionReader("camera", {**setup.options, "url": main_url(setup.options)})
     url = options.text("url")
     scheme = url.partition("://")[0].lower()
     if scheme not in _SCHEMES:

@@ -68,6 +68,7 @@ from urc.web.people.people_routes import PeopleRoutes
 from urc.web.people.proxy_middleware import ProxyMiddleware
 from urc.web.people.sign_in_page import Stoppable
 from urc.web.people.ways_in import SignInOptions, WaysIn
+from urc.web.picture_socket import PictureSocket
 from urc.web.robot_services import Stores, fleet_of, latch_of
 from urc.web.serve.access import Access
 from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
@@ -229,6 +230,7 @@ class _Dashboard(Starlette):
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
                 ProtectedSocket("/ws/spare", routes.spare, SIGNED_IN),
+                ProtectedSocket("/ws/pictures", routes.pictures, SIGNED_IN),
                 *routes.foxglove().routes(),
                 *(dev.routes() if dev else no_dev_routes()),
                 *(() if routes.dev_start else no_dev_start()),
@@ -500,6 +502,13 @@ class _Routes:
         if service is not None:
             flow = websocket.scope["state"]["flow"]
             await RedundantSocket(websocket, service.controls, service.clock, flow).serve()
+
+    async def pictures(self, websocket: WebSocket) -> None:
+        """Serve the socket for a page's images."""
+        _, service = await self._accepted(websocket)
+        if service is not None:
+            flow = websocket.scope["state"]["flow"]
+            await PictureSocket(websocket, service.picture_pages, service.clock, flow).serve()
 
     async def _accepted(self, websocket: WebSocket) -> tuple[str, RobotService | None]:
         """Accept a page's socket; return its robot's name and service, or close the socket."""

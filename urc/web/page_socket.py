@@ -9,6 +9,7 @@ import asyncio
 import logging
 import math
 from collections import deque
+from functools import partial
 from time import time
 
 from starlette.types import Message
@@ -21,6 +22,7 @@ from urc.web.drive.control_service import OperatorSession
 from urc.web.feed.alarm_feed import AlarmPlace
 from urc.web.feed.client_socket import ClientSocket, FlowControl, SocketPeer, TokenBucket
 from urc.web.feed.fanout import Place
+from urc.web.feed.picture_line import PictureLine
 from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missing_settings
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
@@ -70,6 +72,10 @@ class BrowserClient:
         """Messages that arrived before the session was open."""
         self._place = Place()
         self._alarm_place = AlarmPlace()
+        self._pictures: PictureLine | None = None
+        """The page's socket for images; None if it has none at present."""
+        self._is_apart = False
+        """Whether images come only over the socket for images."""
         self._live: LiveSession | None = None
         """The robot's open session; None until the page has received the session's signal
         indexes."""
@@ -159,10 +165,12 @@ class BrowserClient:
         self._place = live.fanout.join(self._flushed)
         self._place.images = operator.images = SentImages(self._service.controls.images.signals)
         self._alarm_place = self._service.alarm_feed.join(self._news.set)
+        pages = self._service.picture_pages
+        key = pages.add(partial(self._take_line, live))
         try:
             self._service.consent.welcome(operator)
             async with asyncio.TaskGroup() as group:
-                writing = group.create_task(self._write(live))
+                writing = group.create_task(self._write(live, key))
                 reading = group.create_task(self._read(live, group))
                 await asyncio.wait((writing, reading), return_when=asyncio.FIRST_COMPLETED)
                 if self._closing and not writing.done():
@@ -175,6 +183,8 @@ class BrowserClient:
             log.warning("a client read nothing for %g s and was disconnected", STALL_S)
             self._flow.abort()
         finally:
+            pages.remove(key)
+            self._take_line(live, None)
             live.fanout.leave(self._flushed, self._place)
             self._service.alarm_feed.leave(self._news.set)
 
@@ -187,10 +197,27 @@ class BrowserClient:
 
     # Writing
 
-    async def _write(self, live: LiveSession) -> None:
+    def _take_line(self, live: LiveSession, line: PictureLine | None) -> None:
+        """Send the page's images over a socket of their own; None if this socket has ended."""
+        before, self._pictures = self._pictures, line
+        if before is not None:
+            before.end()
+        live.fanout.restart(self._place, line.window if line is not None else None)
+        if line is not None:
+            line.wake = partial(self._pump, live)
+            self._pump(live)
+
+    def _pump(self, live: LiveSession) -> None:
+        """Send images over the socket for images, as far as the line bears them."""
+        if self._pictures is not None and self._place.shown:
+            self._pictures.pump(partial(live.fanout.next_message, self._place))
+
+    async def _write(self, live: LiveSession, key: str) -> None:
         robot, now_s = self._service.robot, self._service.clock.now()
         is_playback = robot.playback is not None
-        hello = wire.encode_hello(robot.profile, live.number, now_s, is_playback=is_playback)
+        hello = wire.encode_hello(
+            robot.profile, live.number, now_s, is_playback=is_playback, pictures=key
+        )
         await self._line.send_text(hello)
         self._live = live
         while True:
@@ -226,6 +253,9 @@ class BrowserClient:
         """Send the data that all pages share, then images until the kernel accepts no more data."""
         if frames := live.fanout.frames_for(self._place):
             self._flow.write(frames)
+        if self._is_apart or self._pictures is not None:
+            self._pump(live)
+            return
         while self._place.shown and self._flow.is_free():
             frame = live.fanout.next_picture(self._place)
             if frame is None:
@@ -296,6 +326,7 @@ class BrowserClient:
             self._drive(asked)
         elif isinstance(asked, ImageSelection):
             self._news.set()
+            self._is_apart = asked.apart
             live.fanout.show(self._place, asked.signals, asked.stills)
         elif isinstance(asked, (Approval, ApprovalRequest, SequenceAction)):
             self._advise(asked, live)

@@ -35,6 +35,7 @@ __all__ = [
     "Tick",
     "Release",
     "Stop",
+    "JoinPictures",
     "JoinRedundant",
 ]
 
@@ -83,6 +84,8 @@ class ImageSelection(
         tuple[Annotated[str, msgspec.Meta(max_length=256)], ...], msgspec.Meta(max_length=64)
     ] = ()
     """The videos among `signals` that the page cannot decode; the server sends JPEG images."""
+    apart: bool = False
+    """Whether the images come only over the socket for images, which the page opens."""
 
 
 class Approval(msgspec.Struct, tag_field="t", tag="agree", forbid_unknown_fields=True, frozen=True):
@@ -199,6 +202,14 @@ class JoinRedundant(
     msgspec.Struct, tag_field="t", tag="spare", forbid_unknown_fields=True, frozen=True
 ):
     """The first message on a redundant socket, with the key from the page's lease."""
+
+    key: str
+
+
+class JoinPictures(
+    msgspec.Struct, tag_field="t", tag="pictures", forbid_unknown_fields=True, frozen=True
+):
+    """The first message on a socket for images, with the key from the page's `HelloMessage`."""
 
     key: str
 

@@ -11,11 +11,14 @@ Layer 3½. Pure. An image, or other bytes::
 An access unit of a video has 2 as its first byte, and the codec string in place of the media type.
 Five bytes follow the common header::
 
-   20  u16  width in pixels        24  u8   1 for a keyframe
+   20  u16  width in pixels        24  u8   flags
    22  u16  height in pixels
 
-A page names the image that it shows by its number. The numbers of one video are consecutive. After
-a gap, the next unit is a keyframe.
+The flag 1 marks a keyframe, and 2 the low stream of the camera. The flag 4 marks keyframes of a
+page that receives no other images.
+
+A page names the image that it shows by its number. The numbers of one stream are consecutive. After
+a gap, the next unit is a keyframe. So is the first unit after a change between two streams.
 """
 
 import struct
@@ -24,9 +27,12 @@ from typing import Final, NamedTuple
 from urc.video import VideoUnit, encode_unit, read_unit
 
 __all__ = [
+    "KEY",
+    "LOW",
     "PICTURE",
     "PICTURE_HEADER",
     "REPEATED",
+    "SPARSE",
     "VIDEO",
     "VIDEO_HEADER",
     "PictureMessage",
@@ -39,6 +45,12 @@ VIDEO: Final = 2
 """First byte of a message with an access unit."""
 REPEATED: Final = 3
 """First byte of a message with an image that the camera repeats."""
+KEY: Final = 1
+"""Flag of a keyframe."""
+LOW: Final = 2
+"""Flag of a unit of the low stream."""
+SPARSE: Final = 4
+"""Flag of a keyframe on a page that receives keyframes only."""
 PICTURE_HEADER: Final = struct.Struct(">BBHIdI")
 VIDEO_HEADER: Final = struct.Struct(">BBHIdIHHB")
 
@@ -68,10 +80,10 @@ def read_picture(message: bytes) -> PictureMessage | None:
 def _read_video(message: bytes) -> PictureMessage | None:
     if len(message) < VIDEO_HEADER.size:
         return None
-    _, length, index, age_ms, _, _, width, height, is_key = VIDEO_HEADER.unpack_from(message)
+    _, length, index, age_ms, _, _, width, height, flags = VIDEO_HEADER.unpack_from(message)
     start = VIDEO_HEADER.size + length
     codec = message[VIDEO_HEADER.size : start].decode("latin-1")
     if not codec.isascii() or start >= len(message):
         return None
-    value = encode_unit(VideoUnit(codec, is_key == 1, width, height, 0.0, message[start:]))
+    value = encode_unit(VideoUnit(codec, bool(flags & KEY), width, height, 0.0, message[start:]))
     return None if read_unit(value) is None else PictureMessage(index, age_ms, value)

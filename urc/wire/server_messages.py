@@ -107,6 +107,8 @@ class HelloMessage(Outbound, tag="hello", omit_defaults=False, frozen=True):
     """Lowest role that may run each command, keyed by command."""
     controls: tuple[str, ...] = ()
     """Names of the held commands."""
+    pictures: str = ""
+    """Secret key for the page's socket for images; "" if the server has no such socket."""
 
 
 class ValuesMessage(Outbound, tag="v", frozen=True):

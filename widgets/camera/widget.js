@@ -263,10 +263,26 @@ class Camera {
     const isRepeated = isShown && (reading.image?.isRepeated === true || reading.video?.firstNumber !== undefined);
     const isFrozen = isRepeated || (isShown && ageS >= this.freeze);
     attribute(this.root, "data-frozen", isFrozen ? "yes" : null);
+    const quality = isShown ? reading.video?.quality : undefined;
+    attribute(this.root, "data-quality", quality?.isSparse ? "keyframes" : quality?.isLow ? "low" : null);
     const rate = this.rate && !isFrozen ? `${this.rate.perSecond(nowS).toFixed(0)} /s` : "";
     const words = isRepeated ? this.t("Camera repeats the same image") : this.t("{age} old", { age: ageText(ageS) });
     const old = isFrozen ? `❄ ${words}` : rate;
-    write(this.age, isShown ? old : DASH);
+    write(this.age, isShown ? [...this.qualityWords(quality), old].filter(Boolean).join(" · ") : DASH);
+  }
+
+  /**
+   * Return what a slow line leaves out of a video.
+   *
+   * @param {import("../../urc/web/static/live/videos.js").Quality | undefined} quality
+   */
+  qualityWords(quality) {
+    const words = quality?.isLow ? [this.t("Low stream")] : [];
+    if (quality?.isSparse) {
+      const count = quality.of;
+      words.push(count > 1 ? this.t("1 of {count} images", { count }) : this.t("Keyframes only"));
+    }
+    return words.map((text) => `▽ ${text}`);
   }
 
   async keep() {

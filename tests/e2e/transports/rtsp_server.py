@@ -1,8 +1,9 @@
 """A camera by GStreamer's RTSP server, for Debian's Python: `gi` is no package of the registry.
 
-    python3 rtsp_server.py PORT SIZE GROUP [USER PASSWORD SCHEME]
+    python3 rtsp_server.py PORT SIZE GROUP [rate=KBIT] [USER PASSWORD SCHEME]
 
-SIZE is WIDTHxHEIGHT, GROUP the number of images between two keyframes. The path is /cam.
+SIZE is WIDTHxHEIGHT, GROUP the number of images between two keyframes. The path is /cam. With a
+rate, the film is noise, so that the encoder needs it.
 """
 
 import sys
@@ -16,11 +17,14 @@ from gi.repository import GLib, Gst, GstRtsp, GstRtspServer  # noqa: E402 - afte
 Gst.init(None)
 port, size, group, *login = sys.argv[1:]
 width, height = size.split("x")
+rate = int(login.pop(0)[5:]) if login and login[0].startswith("rate=") else 0
+pattern, bits = ("snow", f" bitrate={rate} vbv-buf-capacity=300") if rate else ("smpte", "")
 film = GstRtspServer.RTSPMediaFactory()
 film.set_shared(True)
 film.set_launch(
-    f"( videotestsrc is-live=true ! video/x-raw,width={width},height={height},framerate=30/1"
-    f" ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max={group}"
+    f"( videotestsrc is-live=true pattern={pattern}"
+    f" ! video/x-raw,width={width},height={height},framerate=30/1"
+    f" ! x264enc tune=zerolatency speed-preset=ultrafast key-int-max={group}{bits}"
     " ! rtph264pay name=pay0 pt=96 config-interval=0 )"
 )
 server = GstRtspServer.RTSPServer()

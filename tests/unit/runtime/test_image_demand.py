@@ -11,10 +11,11 @@ from urc.model.driver import Driver
 from urc.model.payload import Envelope
 from urc.model.values import Sample
 from urc.runtime.hub import Hub, LinkState, LinkStatus
-from urc.runtime.image_demand import PAUSE_AFTER_S, ImageDemand, pausable_topics
-from urc.runtime.image_viewers import GLANCE_S
+from urc.runtime.image_demand import PAUSE_AFTER_S, ImageDemand, low_streams, pausable_topics
+from urc.runtime.image_viewers import GLANCE_S, low_stream
 from urc.runtime.registries import built_in_catalog
 from urc.testing.clock import FakeClock, settle
+from urc.transports.base import LOW_STREAM
 
 pytestmark = pytest.mark.anyio
 
@@ -206,3 +207,41 @@ async def test_a_camera_without_viewers_is_paused_as_a_whole(
     with hub.viewers.viewing(["picture"]):
         demand.check()
         assert sent == (["unsubscribe", "subscribe"] if is_paused else [])
+
+
+TWO_STREAMS = """
+urc: 1
+kind: robot
+name: eye
+title: Eye
+transports:
+  eye:
+    type: camera
+    streams: { high: "rtsp://10.0.0.2/1", low: "rtsp://10.0.0.2/2" }
+signals:
+  picture: { type: video, stale_after: 2s }
+messages:
+  picture: { raw: picture }
+"""
+
+
+async def test_a_low_stream_is_open_only_while_a_page_shows_it(tmp_path: Path) -> None:
+    """Not for a recording, nor at the start of a connection."""
+    driver, clock = driver_of(tmp_path, TWO_STREAMS), FakeClock()
+    assert low_streams(driver) == {"eye": {"picture"}}
+    hub, sent = Hub(driver.signals), list[str]()
+
+    def send(transport: str, envelope: Envelope) -> None:
+        sent.append(f"{envelope.verb} {envelope.attributes['topic']}")
+
+    desk = Desk(ImageDemand(pausable_topics(driver, {}), hub, send, clock), hub, clock, sent)
+    hub.set_link(LinkStatus("eye", "live", "camera x", clock.now()))
+    with hub.tap():
+        assert await desk.after(10) == []
+    with hub.viewers.viewing(["picture", low_stream("picture")]):
+        assert await desk.after(1) == [f"subscribe {LOW_STREAM}"]
+        hub.set_link(LinkStatus("eye", "live", "camera x", clock.now()))
+        assert await desk.after(1) == [f"subscribe {LOW_STREAM}"]
+    with hub.viewers.viewing([low_stream("picture")]):
+        assert await desk.after(10) == ["unsubscribe "]
+    assert await desk.after(10) == [f"unsubscribe {LOW_STREAM}"]

@@ -10,6 +10,7 @@ from urc.cli.main import main
 from urc.images import MAX_PIXELS
 from urc.transports import camera
 from urc.transports.base import MissingPackage, Transport, TransportError, TransportSetup
+from urc.transports.camera_options import read_low_options, read_options
 from urc.transports.camera_process import EarlyUnits, capture_s
 from urc.transports.camera_records import (
     NOTE,
@@ -65,6 +66,25 @@ def test_an_invalid_option_is_named(options: dict[str, object], said: str) -> No
     with pytest.raises(TransportError) as told:
         made(**options)
     assert str(told.value).startswith(said)
+
+
+STREAMS = {"high": "rtsp://10.0.0.2/1", "low": "rtsp://10.0.0.2/2"}
+
+
+def test_two_streams_share_all_other_options() -> None:
+    setup = TransportSetup("eye", {"streams": STREAMS, "auth": AUTH, "rtp": "udp"})
+    high, low = read_options(setup), read_low_options(setup)
+    assert low is not None
+    assert (high.place.path, low.place.path) == ("/1", "/2")
+    assert low._replace(place=high.place) == high
+    assert made(streams=STREAMS).address == "camera rtsp://10.0.0.2:554/1"
+    assert read_low_options(TransportSetup("eye", {"url": "rtsp://a/"})) is None
+
+
+def test_an_invalid_low_stream_is_named() -> None:
+    with pytest.raises(TransportError) as told:
+        made(streams={**STREAMS, "low": "rtsp://u:p@10.0.0.2/"})
+    assert str(told.value).startswith("camera: put user and password under auth")
 
 
 def test_a_missing_library_is_named_with_its_command(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -87,6 +87,9 @@ class FakeLine:
     def listen(self, sink: Callable[[bytes], bool]) -> None:
         self.sink = sink
 
+    def notify(self, freed: Callable[[], None]) -> None:
+        self.freed = freed
+
     def hold_back(self, is_held: bool) -> None:
         self.is_held_back = is_held
 

@@ -91,6 +91,7 @@ def test_hello_says_what_each_signal_means_and_where_it_comes_from() -> None:
         ],
         "roles": {"home": "drive", "calibrate": "maintain", "drive": "drive"},
         "controls": ["drive"],
+        "pictures": "",
     }  # fmt: skip
 
 

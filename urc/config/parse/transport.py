@@ -64,6 +64,8 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
             or did_you_mean(kind.data, catalog.transports, "types"),
         )
     check_headers(part, problems)
+    if kind.data == "camera":
+        _check_streams(part, problems)
     encoding = part.text("encoding", "utf-8")
     options = {
         name: _option(inner, problems)
@@ -86,6 +88,18 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
         never_replies=part.text("replies") == "never",
         hint=part.text("hint"),
     )
+
+
+def _check_streams(part: Node, problems: Problems) -> None:
+    """Report a camera with a stream besides its two streams."""
+    if part.get("streams") is not None and part.get("url") is not None:
+        problems.error(
+            part.must("url"),
+            "wrong-form",
+            "'url' and 'streams' cannot be used together",
+            key=True,
+            hint="write the address under streams: high",
+        )
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:

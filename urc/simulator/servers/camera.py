@@ -2,6 +2,7 @@
 
 With an ``rtsp`` URL, the camera is an RTSP server. With a ``udp`` URL, it sends datagrams to the
 port on which the driver listens. On free ports, a camera with any other URL sends datagrams too.
+A camera with two streams has only the high one.
 
 If the robot has a world, the camera sends video while the world gives its signal an image. A rule
 can therefore start and stop the video with a command. Without a world, the camera always sends an
@@ -19,6 +20,7 @@ from urc.simulator.servers.camera_images import CameraImages
 from urc.simulator.servers.rtsp import RtspServer
 from urc.simulator.servers.udp import free_port, reachable
 from urc.simulator.servers.video_encoder import VideoEncoder
+from urc.transports.camera_options import main_url
 
 __all__ = ["CameraServer", "has_encoder"]
 
@@ -45,18 +47,19 @@ class CameraServer:
     async def open(self) -> Endpoint:
         """Start the camera; without the package that encodes video, only return its address."""
         context = self._context
-        url = str(context.options.get("url"))
+        url = str(main_url(context.options))
         if url.partition("://")[0].lower() in ("rtsp", "rtsps"):
             server = RtspServer(context, self._images)
             if not has_encoder():
-                return _silent({"url": url})
+                return _silent({"url": url, "streams": None})
             found = await server.open()
+            found = found._replace(options={**found.options, "streams": None})
             self._rtsp = server
         else:
             port = free_port(context.host) if context.is_anywhere else _port(context, url)
             host = reachable(context.host)
             options: dict[str, object] = {"url": f"udp://{host_and_port(host, port)}", "host": host}
-            options |= dict.fromkeys(("auth", "tls"))
+            options |= dict.fromkeys(("auth", "tls", "streams"))
             if not has_encoder():
                 return _silent(options)
             text = f"camera, sends to {host_and_port(host, port)}"

@@ -55,6 +55,9 @@ class FlowControl(Protocol):
         which `sink` returns False.
         """
 
+    def notify(self, freed: Callable[[], None]) -> None:
+        """Call `freed` whenever the kernel has accepted all written data after a pause."""
+
     def hold_back(self, is_held: bool) -> None:
         """Pause or resume reading; unread data stays in the kernel's buffer."""
 
@@ -68,6 +71,7 @@ class SocketFlow:
     def __init__(self) -> None:
         self.sink: Callable[[bytes], bool] | None = None
         """Callback for each complete text message."""
+        self._freed: Callable[[], None] = _rest
         self._transport: asyncio.Transport | None = None
         self._is_free = True
         self._writable = asyncio.Event()
@@ -82,6 +86,7 @@ class SocketFlow:
 
     def lost(self) -> None:
         """Wake a waiting writer, which then notices the closed connection."""
+        self._freed = _rest
         self.resume()
 
     def pause(self) -> None:
@@ -93,6 +98,7 @@ class SocketFlow:
         """Record that the kernel has accepted all written data."""
         self._is_free = True
         self._writable.set()
+        self._freed()
 
     # Called by the client
 
@@ -117,6 +123,10 @@ class SocketFlow:
         """Pass each complete text message to `sink`."""
         self.sink = sink
 
+    def notify(self, freed: Callable[[], None]) -> None:
+        """Call `freed` whenever the kernel has accepted all written data after a pause."""
+        self._freed = freed
+
     def hold_back(self, is_held: bool) -> None:
         """Pause or resume reading from the socket."""
         if self._transport and not self.is_closing():
@@ -126,6 +136,10 @@ class SocketFlow:
         """Close the connection immediately, without a handshake."""
         if self._transport:
             self._transport.abort()
+
+
+def _rest() -> None:
+    """Do nothing."""
 
 
 class TokenBucket:

@@ -15,6 +15,7 @@ from urc.model.values import NOTHING, Sample
 from urc.motion.driving_lock import SentImages
 from urc.runtime.clock import Clock, LoopClock, Timer
 from urc.runtime.hub import Hub
+from urc.web.feed.delivery_window import DeliveryWindow
 from urc.web.feed.image_cache import ImageCache, ImageSubscription, is_picture
 from urc.web.feed.video_feed import VideoFeed, VideoSubscription
 from urc.web.feed.video_stills import VideoStills
@@ -26,7 +27,7 @@ from urc.web.wire.messages import (
     encode_topics,
     encode_values,
 )
-from urc.web.wire.picture import NUMBERS, as_frame
+from urc.web.wire.picture import NUMBERS, as_frame, message_of
 
 __all__ = ["FRAMES_PER_SECOND", "Fanout", "FanoutPosition", "Pacer", "Place"]
 
@@ -64,7 +65,11 @@ class Place:
     images: SentImages = field(default_factory=SentImages, compare=False)
     """The images that the client has received, for the driving lock."""
     shown: tuple[str, ...] = ()
-    """Signals of both subscriptions, counted as viewed."""
+    """Signals of both subscriptions."""
+    viewed: tuple[str, ...] = ()
+    """Streams that count this client as a viewer."""
+    is_videos_turn: bool = True
+    """Whether a video comes before an image, so that neither blocks the other."""
 
 
 class _Update(NamedTuple):
@@ -143,13 +148,19 @@ class Fanout:
         self._broken = self._loop.create_future()
         try:
             with self.hub.passed_to(self.videos.take), self.hub.heed(self._changed):
+                self.hub.on_low = self._take_low
                 if self.hub.revision:
                     self._changed()
                 await self._broken
         finally:
             if self._due is not None:
                 self._due.cancel()
+            self.hub.on_low = None
             await self.stills.close()
+
+    def _take_low(self, name: str, value: bytes) -> None:
+        self.videos.take_low(name, value)
+        self._changed()
 
     def _changed(self) -> None:
         """Schedule a flush for a later iteration of the event loop, as soon as the rate permits."""
@@ -193,8 +204,6 @@ class Fanout:
         """
         shown = tuple(dict.fromkeys(names))
         is_video = self.videos.groups.keys() - set(stills)
-        viewers = self.hub.viewers
-        viewers.remove(place.shown)
         place.shown = shown
         for name in place.videos.names:
             if name in stills:
@@ -204,15 +213,52 @@ class Fanout:
                 place.images.forget(name)
         place.videos.show(name for name in shown if name in is_video)
         place.subscription.show(name for name in shown if name not in is_video)
-        viewers.add(shown)
+        self._count_viewer(place)
         self.stills.show(place, self.videos.groups.keys() & place.subscription.names)
+
+    def restart(self, place: Place, line: DeliveryWindow | None) -> None:
+        """Send all shown images again, because the client has another socket for them.
+
+        Args:
+            place: the client's position.
+            line: the window of the socket for images; None if the client has none.
+        """
+        place.videos.restart(line)
+        place.subscription.seen.clear()
+        self._count_viewer(place)
+
+    def _count_viewer(self, place: Place) -> None:
+        viewed = (*place.videos.streams(), *place.subscription.names)
+        if viewed != place.viewed:
+            before, place.viewed = place.viewed, viewed
+            self.hub.viewers.add(viewed)
+            self.hub.viewers.remove(before)
+
+    def next_message(self, place: Place) -> memoryview | None:
+        """Return the next image or access unit for the client as a message; None if none."""
+        frame = self.next_picture(place)
+        return None if frame is None else message_of(frame)
 
     def next_picture(self, place: Place) -> bytes | None:
         """Return the frame with the next image or access unit for the client; None if none."""
-        if place.videos.names:
-            frame = self.videos.next_frame(place.videos, place.images)
-            if frame is not None:
-                return frame
+        first, second = self._next_unit, self._next_image
+        if not place.is_videos_turn:
+            first, second = second, first
+        frame = first(place)
+        if frame is None:
+            return second(place)
+        place.is_videos_turn = not place.is_videos_turn
+        return frame
+
+    def _next_unit(self, place: Place) -> bytes | None:
+        if not place.videos.names:
+            return None
+        frame = self.videos.next_frame(place.videos, place.images)
+        if self.videos.lows:
+            self._count_viewer(place)
+        return frame
+
+    def _next_image(self, place: Place) -> bytes | None:
         if not place.subscription.names:
             return None
         picture = self.cache.next_image(place.subscription)

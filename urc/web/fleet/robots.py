@@ -40,6 +40,7 @@ from urc.web.drive.two_person import TwoPersonRule
 from urc.web.feed.alarm_feed import AlarmFeed
 from urc.web.feed.client_socket import SocketPeer
 from urc.web.feed.fanout import Fanout
+from urc.web.feed.picture_line import PicturePages
 from urc.web.feed.topic_watch import TopicWatch
 
 __all__ = [
@@ -247,6 +248,7 @@ class RobotService:
         self.commands = CommandRunner(self.controls, self.consent, self.clock)
         self.alarms = alarms or RobotAlarms(robot.profile.driver, self.clock, time.time)
         self.alarm_feed = AlarmFeed(self.alarms, self.clock)
+        self.picture_pages = PicturePages()
         self._linger_s = linger_s
         self._start_lock = start_lock or asyncio.Lock()
         self._visitors = 0

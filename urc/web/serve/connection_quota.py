@@ -15,8 +15,8 @@ __all__ = ["KNOWN_PLACES", "PLACES", "ConnectionQuota", "is_stop"]
 
 PLACES = 32
 """Maximum number of concurrent requests and sockets of all unknown visitors at one address. A page
-uses up to two sockets and six requests, so the limit permits several pages and a few people behind
-one address."""
+uses up to three sockets and six requests, so the limit permits several pages and a few people
+behind one address."""
 KNOWN_PLACES = 256
 """Maximum number of concurrent requests and sockets of one known person, device or program. The
 limit is high, because a known visitor may watch many robots."""

@@ -140,8 +140,12 @@ def decode(text: str | bytes) -> Inbound:
     return decoded(_decoder, text)
 
 
-def encode_hello(profile: Profile, session: str, now_s: float, *, is_playback: bool = False) -> str:
+def encode_hello(
+    profile: Profile, session: str, now_s: float, *, is_playback: bool = False, pictures: str = ""
+) -> str:
     """Return the first message, which defines the meaning of all indexes.
+
+    The key `pictures` is for the page's socket for images.
 
     The page does not compare the images of a playback, because a jump shows images again.
     """
@@ -163,6 +167,7 @@ def encode_hello(profile: Profile, session: str, now_s: float, *, is_playback: b
             controls=tuple(
                 name for name, one in profile.driver.commands.items() if one.hold is not None
             ),
+            pictures=pictures,
         )
     )
 

@@ -3,10 +3,16 @@
  * The page's connections to its server. The playground replaces this module, because its server is
  * a worker of the page.
  */
+import { scriptUrl } from "./trusted_scripts.js";
 
 /** @param {string} url */
 export function openSocket(url) {
   return new WebSocket(url);
+}
+
+/** Start the worker that receives images over a socket of its own. @returns {Worker | null} null without such a socket */
+export function pictureWorker() {
+  return new Worker(scriptUrl("pictures"));
 }
 
 /**

@@ -64,6 +64,7 @@
  * @property {number} number Number of its access unit.
  * @property {number} timeMs Time of the image on this page's clock; of a repeated image, the first one's.
  * @property {number | undefined} [firstNumber] Number of the image that the camera repeats.
+ * @property {import("../live/videos.js").Quality | undefined} [quality] What the page receives of the video.
  *
  * @typedef {object} Conversion Conversion from a signal's unit to another: value · factor + offset.
  * @property {number} factor
@@ -145,6 +146,7 @@
  * @property {string} title
  * @property {number} now
  * @property {Signal[]} signals
+ * @property {string} [pictures] Key for the socket for images.
  *
  * @typedef {object} Values
  * @property {number} n

@@ -13,7 +13,8 @@
  * @property {number} index
  * @property {number} ageMs
  * @property {number} sentMs
- * @property {number} number Number of the image; those of one video are consecutive.
+ * @property {number} number Number of the image; those of one stream of a video are consecutive. Numbers above
+ *   `FIRST_LOW` belong to the low stream.
  * @property {string} type media type, or the codec string of a video
  * @property {Uint8Array<ArrayBuffer>} bytes
  * @property {boolean | undefined} [isRepeated] Whether the camera repeats the image.
@@ -23,11 +24,16 @@
  * @property {number} width pixels
  * @property {number} height
  * @property {boolean} isKey Whether decoding can start with this access unit.
+ * @property {boolean} isSparse Whether this page receives keyframes only, because its line bears no more.
  */
 
+/** Number before the first access unit of a low stream. */
+export const FIRST_LOW = 2 ** 31;
 const PICTURE = 1;
 const VIDEO = 2;
 const REPEATED = 3;
+/** Flags of an access unit. */
+const [KEY, SPARSE] = [1, 4];
 const HEADER = 20;
 const VIDEO_HEADER = 25;
 
@@ -53,10 +59,12 @@ export function frameOf(data) {
   };
   if (kind === PICTURE) return frame;
   if (kind === REPEATED) return { ...frame, isRepeated: true };
+  const flags = view.getUint8(24);
   const video = {
     width: view.getUint16(20),
     height: view.getUint16(22),
-    isKey: view.getUint8(24) === 1,
+    isKey: (flags & KEY) !== 0,
+    isSparse: (flags & SPARSE) !== 0,
   };
   return { ...frame, video };
 }

@@ -11,6 +11,7 @@ import { Badge, part } from "./badge.js";
 import { Controls } from "../control/controls.js";
 import { Drive } from "../control/drive.js";
 import { PageAlarms } from "../alarms/page_alarms.js";
+import { PictureLine } from "./picture_line.js";
 import { PageTopics, Log, Themes, watched } from "./page_topics.js";
 import { frameOf } from "./frames.js";
 import { offerHints } from "./hints.js";
@@ -68,6 +69,7 @@ const socket = new Socket(address.href, {
   state(isUp) {
     store.setUp(isUp, performance.now());
     if (!isUp) {
+      pictures.join("");
       giveUpCommands();
       goals = UNKNOWN_GOALS; // until the server tells of them again
       lostGoals.show([]);
@@ -79,6 +81,9 @@ const socket = new Socket(address.href, {
     wake();
   },
 });
+const apart = new URL(address);
+apart.pathname += "/pictures";
+const pictures = new PictureLine(apart.href, takePicture);
 const spare = new URL(address);
 spare.pathname += "/spare";
 const drive = new Drive(socket, root.dataset["stop"] ?? "", wake, spare.href);
@@ -217,21 +222,26 @@ function shows(name) {
 function askPictures() {
   const signals = [...new Set([...host.pictures(), ...stage.pictures()])];
   const stills = videos.undecoded(signals);
-  const wanted = JSON.stringify([signals, stills]);
-  if (wanted === shown || !socket.send(stills.length > 0 ? { t: "show", signals, stills } : { t: "show", signals })) return;
+  const apart = signals.length > 0 && pictures.use();
+  const wanted = JSON.stringify([signals, stills, apart]);
+  const said = { t: "show", signals, ...(stills.length > 0 && { stills }), ...(apart && { apart }) };
+  if (wanted === shown || !socket.send(said)) return;
   shown = wanted;
   videos.keep(signals);
 }
 
-/** @param {ArrayBuffer} data */
-function takePicture(data) {
+/**
+ * @param {ArrayBuffer} data
+ * @param {number} [nowMs] time of arrival
+ */
+function takePicture(data, nowMs = performance.now()) {
   const frame = frameOf(data);
   if (!frame) return;
   if (frame.video) {
-    videos.take(frame, performance.now());
+    videos.take(frame, nowMs);
     return;
   }
-  store.picture(frame, performance.now());
+  store.picture(frame, nowMs);
   wakeWidgets();
 }
 
@@ -251,8 +261,9 @@ function take(message) {
       screenName.tell();
       alarms.clear();
       videos.keep([]);
+      pictures.join(message.pictures ?? "");
       input.images.clear();
-      shown = "[[],[]]"; // a new connection sends no images before a request
+      shown = "[[],[],false]"; // a new connection sends no images before a request
       break;
     case "alarms":
       alarms.take(message);

@@ -46,6 +46,17 @@ export class StandingPictures {
   }
 
   /**
+   * Take over a standing picture from another stream of the same camera, until new keyframes show motion. The
+   * first keyframe of this stream shows nothing, because nothing is known to compare it with.
+   *
+   * @param {First} since
+   */
+  inherit(since) {
+    if (!this.since || since.timeMs < this.since.timeMs) this.since = since;
+    this.news = -1;
+  }
+
+  /**
    * @param {First} since
    * @param {number} timeMs
    */

@@ -186,12 +186,13 @@ export class Store {
    * @param {number} timeMs
    * @param {number} number number of its access unit
    * @param {number} [firstNumber] number of the image that the camera repeats
+   * @param {import("./videos.js").Quality} [quality] what the page receives of the video
    */
-  videoImage(name, bitmap, timeMs, number, firstNumber) {
+  videoImage(name, bitmap, timeMs, number, firstNumber, quality) {
     this.serial += 1;
     this.samples.get(name)?.video?.bitmap.close();
     const value = { bytes: bitmap.width * bitmap.height };
-    const video = { bitmap, serial: this.serial, signal: name, number, timeMs, firstNumber };
+    const video = { bitmap, serial: this.serial, signal: name, number, timeMs, firstNumber, quality };
     this.samples.set(name, { value, alarm: "", timeMs, serial: this.serial, video });
   }
 

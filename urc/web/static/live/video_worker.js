@@ -11,6 +11,8 @@
 const LATE_UNITS = 12;
 /** Number of waiting access units at which further ones are dropped until the next keyframe. */
 const MOST_UNITS = 300;
+/** Number before the first access unit of a low stream. */
+const FIRST_LOW = 2 ** 31;
 /** Numbers of compared blocks in a row and in a column. */
 const [COLUMNS, ROWS] = [20, 15];
 
@@ -79,6 +81,7 @@ class Video {
     /** Units that wait for the answer whether the codec is supported. @type {EncodedVideoChunk[] | null} */
     this.early = null;
     this.needsKey = true;
+    this.isLow = false;
     this.isOver = false;
     /** Newest decoded image that is not posted yet. @type {VideoFrame | null} */
     this.next = null;
@@ -91,12 +94,15 @@ class Video {
   take({ number, timeMs, isKey, codec, data, isCompared }) {
     if (this.needsKey && !isKey) return;
     const waiting = this.early?.length ?? this.decoder?.decodeQueueSize ?? 0;
-    if (isKey && (codec !== this.codec || !this.decoder || waiting > LATE_UNITS)) this.begin(codec);
+    const isOther = number > FIRST_LOW !== this.isLow;
+    if (isKey && isOther) this.keys.clear();
+    if (isKey && (codec !== this.codec || isOther || !this.decoder || waiting > LATE_UNITS)) this.begin(codec);
     else if (waiting > MOST_UNITS) {
       this.needsKey = true;
       return;
     }
     this.needsKey = false;
+    this.isLow = number > FIRST_LOW;
     if (isKey && isCompared) this.keys.set(number, timeMs);
     const chunk = new EncodedVideoChunk({ type: isKey ? "key" : "delta", timestamp: number, data });
     if (this.early) this.early.push(chunk);

@@ -6,6 +6,7 @@
  * browser lacks, the page requests JPEG images instead.
  */
 import { scriptUrl } from "../core/trusted_scripts.js";
+import { FIRST_LOW } from "./frames.js";
 import { StandingPictures } from "./standing_pictures.js";
 
 /** Number of faults of a video after which the page requests JPEG images. */
@@ -16,6 +17,22 @@ const FORGIVEN_AFTER = 100;
 const MOST_REORDERED = 16;
 /** Maximum number of access units without an image; the browser then decodes too slowly, or not at all. */
 const MOST_TIMES = 2000;
+
+/** @param {number} number number of an access unit */
+const isOfLow = (number) => number > FIRST_LOW;
+
+/**
+ * @param {string} signal
+ * @param {number} number
+ */
+const streamOf = (signal, number) => (isOfLow(number) ? `${signal}#low` : signal);
+
+/**
+ * @typedef {object} Quality
+ * @property {boolean} isLow Whether the page receives the low stream of the camera.
+ * @property {boolean} isSparse Whether the page receives keyframes only.
+ * @property {number} of Number of images from one keyframe to the next on such a page; 0 while unknown.
+ */
 
 export class Videos {
   /**
@@ -34,8 +51,12 @@ export class Videos {
     this.worker = null;
     /** Time of each access unit in the decoder, by signal and number. @type {Map<string, Map<number, number>>} */
     this.times = new Map();
-    /** Keyframes of compared videos; kept while a video is hidden. @type {Map<string, StandingPictures>} */
+    /** Keyframes of compared videos, by stream; kept while a video is hidden. @type {Map<string, StandingPictures>} */
     this.standing = new Map();
+    /** Newest access unit of each video. @type {Map<string, import("./frames.js").BinaryFrame>} */
+    this.newest = new Map();
+    /** What the page receives of each video. @type {Map<string, Quality>} */
+    this.qualities = new Map();
     /** Faults of each video, and the images since the last one. @type {Map<string, {count: number, images: number}>} */
     this.faults = new Map();
     /** Videos that the page cannot decode. @type {Set<string>} */
@@ -53,12 +74,35 @@ export class Videos {
     if (!video || signal === undefined || this.stills.has(signal)) return;
     const times = this.times.get(signal) ?? new Map();
     this.times.set(signal, times);
+    this.note(signal, frame);
     if (times.size >= MOST_TIMES) times.clear();
     times.set(number, timeMs);
     const data = frame.bytes.slice().buffer;
     const isCompared = this.frozenAfterMs(signal) > 0;
     const unit = { signal, number, timeMs, isKey: video.isKey, codec: frame.type, data, isCompared };
     this.decoder().postMessage(unit, [data]);
+  }
+
+  /**
+   * Note what the page receives of a video, and the change between its streams.
+   *
+   * @param {string} signal
+   * @param {import("./frames.js").BinaryFrame} frame
+   */
+  note(signal, frame) {
+    const last = this.newest.get(signal);
+    this.newest.set(signal, frame);
+    const isLow = isOfLow(frame.number);
+    const isSparse = frame.video?.isSparse === true;
+    const isSame = last !== undefined && isOfLow(last.number) === isLow;
+    if (last && !isSame) {
+      this.times.get(signal)?.clear();
+      const standing = this.standing.get(streamOf(signal, last.number));
+      if (standing?.since) this.standingOf(signal, frame.number).inherit(standing.since);
+    }
+    // The image before the first keyframe alone may have been any image of its group.
+    const of = isSame && isSparse && last.video?.isSparse ? frame.number - last.number : 0;
+    this.qualities.set(signal, { isLow, isSparse, of });
   }
 
   /** Return the time after which equal images count as one; 0 for never. @param {string} signal */
@@ -77,6 +121,8 @@ export class Videos {
     for (const signal of this.times.keys()) {
       if (shown.includes(signal) && !this.stills.has(signal)) continue;
       this.times.delete(signal);
+      this.newest.delete(signal);
+      this.qualities.delete(signal);
       this.worker?.postMessage({ signal, isOver: true });
     }
   }
@@ -93,7 +139,7 @@ export class Videos {
   /** @param {{signal: string, number: number, timeMs?: number, bitmap?: ImageBitmap, blocks?: Uint32Array, fault?: string}} told */
   answer({ signal, number, timeMs: keyMs, bitmap, blocks, fault }) {
     if (blocks && keyMs !== undefined) {
-      this.standingOf(signal).add({ number, timeMs: keyMs, blocks });
+      this.standingOf(signal, number).add({ number, timeMs: keyMs, blocks });
       return;
     }
     if (fault !== undefined) {
@@ -115,15 +161,22 @@ export class Videos {
     const faults = this.faults.get(signal);
     if (faults && (faults.images += 1) >= FORGIVEN_AFTER) this.faults.delete(signal);
     const afterMs = this.frozenAfterMs(signal);
-    const first = afterMs > 0 ? this.standingOf(signal).first(timeMs, afterMs) : null;
-    this.store.videoImage(signal, bitmap, first?.timeMs ?? timeMs, number, first?.number);
+    const first = afterMs > 0 ? this.standingOf(signal, number).first(timeMs, afterMs) : null;
+    const quality = this.qualities.get(signal);
+    this.store.videoImage(signal, bitmap, first?.timeMs ?? timeMs, number, first?.number, quality);
     this.changed();
   }
 
-  /** @param {string} signal */
-  standingOf(signal) {
-    const known = this.standing.get(signal) ?? new StandingPictures();
-    this.standing.set(signal, known);
+  /**
+   * Return the comparison of keyframes of the stream that contains an access unit.
+   *
+   * @param {string} signal
+   * @param {number} number
+   */
+  standingOf(signal, number) {
+    const stream = streamOf(signal, number);
+    const known = this.standing.get(stream) ?? new StandingPictures();
+    this.standing.set(stream, known);
     return known;
   }
 
