@@ -54,6 +54,8 @@ NAMES = (
     "motion_loss",
     "driving_lock",
     "video_age",
+    "video_line",
+    "video_relay",
 )
 
 PROGRAMS = {
@@ -71,6 +73,8 @@ PROGRAMS = {
     "playground": ("chromium", "node", "pyodide", "axe"),
     "motion_input": ("chromium",),
     "driving_lock": ("chromium", "ffmpeg"),
+    "video_line": ("ffmpeg",),
+    "video_relay": ("ffmpeg",),
 }
 """Programs that each benchmark needs besides Python, as named in `scripts.needs`."""
 

@@ -1,0 +1,138 @@
+"""Processor time for four videos of 640 × 480 pixels: URC compared with a plain relay.
+
+ffmpeg sends each datagram to URC and to the relay. URC takes the streams apart into access units,
+in a process for each camera, and sends the units to a page that confirms them. The relay sends each
+datagram to its page as one WebSocket message. Both work in the same run, at the same time.
+
+Ten pages then show the same videos. The number of processes that take streams apart must not grow.
+"""
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Final
+
+from bench.figures import tell
+from bench.harness import Result
+from bench.line_page import Plan
+from bench.processes import cpu_s, spent_s
+from bench.rig.programs import Program, Server
+from bench.video_films import RATE_HZ, film, profile, sending
+
+__all__ = ["run"]
+
+CAMERAS: Final = 4
+FILM_KBIT: Final = 1500
+PAGES: Final = 10
+LASTS_S, LASTS_IF_FULL_S = 10.0, 30.0
+GOAL: Final = 2.0
+LEAST_SHARE: Final = 0.95
+"""Share of the images that the page must have received; otherwise the machine was too busy."""
+READY_S: Final = 60.0
+_FIRST_PORT: Final = 5610
+
+
+def run(*, full: bool) -> Sequence[Result]:
+    """Compare the processor time of URC's processes with that of the relay."""
+    lasts_s = LASTS_IF_FULL_S if full else LASTS_S
+    ours = [_FIRST_PORT + place for place in range(CAMERAS)]
+    theirs = [port + CAMERAS for port in ours]
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        place = Path(folder)
+        sent = film(place, FILM_KBIT)
+        file = place / "film.yaml"
+        file.write_text(profile("film", ours), "utf-8")
+        server = stack.enter_context(Server([file], place / "data"))
+        relay = stack.enter_context(
+            Program([sys.executable, "-m", "bench.relay_datagrams", *map(str, theirs)])
+        )
+        relay_port = relay.wait_for("ready", READY_S)[1]
+        viewers = [sys.executable, "-m", "bench.viewers", relay_port, "/", "1"]
+        watching = stack.enter_context(Program(viewers))
+        watching.wait_for("ready", READY_S)
+        for ports in zip(ours, theirs, strict=True):
+            stack.enter_context(Program(sending(sent, ports)))
+        pages = [_page(stack, server)]
+        ratio, base_s, ours_s, images_hz = _compare(server, relay, pages[0], lasts_s)
+        cameras = len(_cameras(server))
+        pages += [_page(stack, server) for _ in range(PAGES - 1)]
+        _, _, many_s, _ = _compare(server, relay, None, lasts_s)
+        many_cameras = len(_cameras(server))
+    tell(
+        {
+            "figure": "video_relay",
+            "program": "plain relay",
+            "pages": 1,
+            "core": _core(base_s, lasts_s),
+        }
+    )
+    tell({"figure": "video_relay", "program": "URC", "pages": 1, "core": _core(ours_s, lasts_s)})
+    tell(
+        {"figure": "video_relay", "program": "URC", "pages": PAGES, "core": _core(many_s, lasts_s)}
+    )
+    if images_hz < LEAST_SHARE * CAMERAS * RATE_HZ:
+        raise SystemExit(f"bench: the page got {images_hz:.0f} images a second; too busy a machine")
+    return [
+        _result(f"{CAMERAS} videos: processor time / plain relay", ratio, GOAL, base_s, ours_s),
+        _result(
+            f"processes that take videos apart: {PAGES} pages / 1 page",
+            many_cameras / max(1, cameras), 1.0, 0.0, 0.0,
+        ),
+    ]  # fmt: skip
+
+
+def _page(stack: ExitStack, server: Server) -> Program:
+    signals = [f"v{place}" for place in range(CAMERAS)]
+    plan = Plan("127.0.0.1", server.port, "film", server.key, "apart", signals, drives=False)
+    page = stack.enter_context(Program([sys.executable, "-m", "bench.line_page"]))
+    page.order(json.dumps(plan._asdict()))
+    page.wait_for("ready", READY_S)
+    return page
+
+
+def _compare(
+    server: Server, relay: Program, page: Program | None, lasts_s: float
+) -> tuple[float, float, float, float]:
+    """Return the ratio, the processor times of both, and the page's images a second."""
+    time.sleep(2.0)  # the streams have begun
+    ours = [server.pid, *_cameras(server)]
+    before = cpu_s([*ours, relay.pid])
+    began_s = time.monotonic()
+    first = _images(page)
+    time.sleep(lasts_s)
+    images_hz = (_images(page) - first) / (time.monotonic() - began_s)
+    after = cpu_s([*ours, relay.pid])
+    base_s = spent_s({relay.pid: before[relay.pid]}, {relay.pid: after[relay.pid]})
+    ours_s = sum(after[one] - before[one] for one in ours)
+    return ours_s / max(base_s, 0.01), base_s, ours_s, images_hz
+
+
+def _images(page: Program | None) -> int:
+    """Return the number of images that a page has received so far."""
+    if page is None:
+        return 0
+    count = len(page.lines)
+    page.order("count")
+    return int(page.wait_for("images", READY_S, after=count)[1])
+
+
+def _cameras(server: Server) -> list[int]:
+    """Return the processes that take the server's videos apart."""
+    found = Path(f"/proc/{server.pid}/task/{server.pid}/children").read_text("ascii").split()
+    return [
+        int(one) for one in found if b"camera_process" in Path(f"/proc/{one}/cmdline").read_bytes()
+    ]
+
+
+def _core(spent: float, lasts_s: float) -> float:
+    return round(spent / lasts_s, 3)
+
+
+def _result(name: str, ratio: float, goal: float, base_s: float, ours_s: float) -> Result:
+    return Result(
+        name, round(ratio, 3), goal, round(1000 * base_s, 1), round(1000 * ours_s, 1), 1.0, 1
+    )
