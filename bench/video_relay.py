@@ -14,12 +14,12 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from bench.figures import tell
 from bench.harness import Result
 from bench.line_page import Plan
-from bench.processes import cpu_s, spent_s
+from bench.processes import cpu_s
 from bench.rig.programs import Program, Server
 from bench.video_films import RATE_HZ, film, profile, sending
 
@@ -57,32 +57,34 @@ def run(*, full: bool) -> Sequence[Result]:
         for ports in zip(ours, theirs, strict=True):
             stack.enter_context(Program(sending(sent, ports)))
         pages = [_page(stack, server)]
-        ratio, base_s, ours_s, images_hz = _compare(server, relay, pages[0], lasts_s)
-        cameras = len(_cameras(server))
+        one, count = _measured(server, relay, pages[0], lasts_s), len(_cameras(server))
         pages += [_page(stack, server) for _ in range(PAGES - 1)]
-        _, _, many_s, _ = _compare(server, relay, None, lasts_s)
-        many_cameras = len(_cameras(server))
-    tell(
-        {
-            "figure": "video_relay",
-            "program": "plain relay",
-            "pages": 1,
-            "core": _core(base_s, lasts_s),
-        }
-    )
-    tell({"figure": "video_relay", "program": "URC", "pages": 1, "core": _core(ours_s, lasts_s)})
-    tell(
-        {"figure": "video_relay", "program": "URC", "pages": PAGES, "core": _core(many_s, lasts_s)}
-    )
-    if images_hz < LEAST_SHARE * CAMERAS * RATE_HZ:
-        raise SystemExit(f"bench: the page got {images_hz:.0f} images a second; too busy a machine")
+        many, many_count = _measured(server, relay, pages[0], lasts_s), len(_cameras(server))
+    _tell("plain relay", 1, one.relay_s / lasts_s, 0)
+    _tell("URC", 1, (one.server_s + one.cameras_s) / lasts_s, count)
+    _tell("URC", PAGES, (many.server_s + many.cameras_s) / lasts_s, many_count)
+    if one.images_hz < LEAST_SHARE * CAMERAS * RATE_HZ:
+        raise SystemExit(f"bench: the page got {one.images_hz:.0f} images a second; too few")
+    base_s, ours_s = max(0.01, one.relay_s), one.server_s + one.cameras_s
     return [
-        _result(f"{CAMERAS} videos: processor time / plain relay", ratio, GOAL, base_s, ours_s),
-        _result(
-            f"processes that take videos apart: {PAGES} pages / 1 page",
-            many_cameras / max(1, cameras), 1.0, 0.0, 0.0,
-        ),
-    ]  # fmt: skip
+        _result(f"{CAMERAS} videos: processor time / plain relay", GOAL, base_s, ours_s),
+        _result(f"{CAMERAS} videos: demuxers of {PAGES} pages / of a page", 1.0, count, many_count),
+    ]
+
+
+class _Load(NamedTuple):
+    """Processor times in seconds, and the rate of the page's images."""
+
+    relay_s: float
+    server_s: float
+    cameras_s: float
+    """Time of the processes that take the videos apart."""
+    images_hz: float
+
+
+def _tell(program: str, pages: int, core: float, demuxers: int) -> None:
+    row = {"program": program, "pages": pages, "core": round(core, 3), "demuxers": demuxers}
+    tell({"figure": "video_relay", **row})
 
 
 def _page(stack: ExitStack, server: Server) -> Program:
@@ -94,27 +96,21 @@ def _page(stack: ExitStack, server: Server) -> Program:
     return page
 
 
-def _compare(
-    server: Server, relay: Program, page: Program | None, lasts_s: float
-) -> tuple[float, float, float, float]:
-    """Return the ratio, the processor times of both, and the page's images a second."""
+def _measured(server: Server, relay: Program, page: Program, lasts_s: float) -> _Load:
     time.sleep(2.0)  # the streams have begun
-    ours = [server.pid, *_cameras(server)]
-    before = cpu_s([*ours, relay.pid])
-    began_s = time.monotonic()
-    first = _images(page)
+    cameras = _cameras(server)
+    before = cpu_s([relay.pid, server.pid, *cameras])
+    began_s, first = time.monotonic(), _images(page)
     time.sleep(lasts_s)
     images_hz = (_images(page) - first) / (time.monotonic() - began_s)
-    after = cpu_s([*ours, relay.pid])
-    base_s = spent_s({relay.pid: before[relay.pid]}, {relay.pid: after[relay.pid]})
-    ours_s = sum(after[one] - before[one] for one in ours)
-    return ours_s / max(base_s, 0.01), base_s, ours_s, images_hz
+    after = cpu_s(before)
+    spent = {one: after[one] - before[one] for one in before}
+    relay_s, server_s = spent.pop(relay.pid), spent.pop(server.pid)
+    return _Load(relay_s, server_s, sum(spent.values()), images_hz)
 
 
-def _images(page: Program | None) -> int:
+def _images(page: Program) -> int:
     """Return the number of images that a page has received so far."""
-    if page is None:
-        return 0
     count = len(page.lines)
     page.order("count")
     return int(page.wait_for("images", READY_S, after=count)[1])
@@ -128,11 +124,6 @@ def _cameras(server: Server) -> list[int]:
     ]
 
 
-def _core(spent: float, lasts_s: float) -> float:
-    return round(spent / lasts_s, 3)
-
-
-def _result(name: str, ratio: float, goal: float, base_s: float, ours_s: float) -> Result:
-    return Result(
-        name, round(ratio, 3), goal, round(1000 * base_s, 1), round(1000 * ours_s, 1), 1.0, 1
-    )
+def _result(name: str, goal: float, base: float, ours: float) -> Result:
+    ratio = round(ours / base, 3)
+    return Result(name, ratio, goal, round(1000 * base, 1), round(1000 * ours, 1), 1.0, 1)

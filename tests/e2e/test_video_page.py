@@ -20,6 +20,7 @@ from tests.e2e.drawn import PIXELS_OF
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 from tests.e2e.transports.programs import program
+from urc.web.feed.picture_line import LAST
 from urc.wire.picture import PICTURE, VIDEO
 
 pytestmark = [pytest.mark.anyio, pytest.mark.needs("ffmpeg")]
@@ -114,10 +115,13 @@ async def card(page: Page, is_one: Callable[[dict[str, Any]], bool]) -> dict[str
 def kinds_of_frames(page: Page) -> list[int]:
     """Return the kinds of the binary messages that the page will receive."""
     kinds: list[int] = []
+    begins = [True]
 
     def note(data: str | bytes) -> None:
         if isinstance(data, bytes):
-            kinds.append(data[0])
+            if begins[0]:
+                kinds.append(data[1])
+            begins[0] = bool(data[0] & LAST)
 
     page.on("websocket", lambda line: line.on("framereceived", note))
     return kinds
