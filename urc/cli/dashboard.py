@@ -3,7 +3,7 @@
 import asyncio
 import gc
 import time
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -25,7 +25,7 @@ from urc.problems import UrcError
 from urc.runtime.audit import FILE, AuditLog
 from urc.runtime.data_restore import is_interrupted
 from urc.runtime.document_tests import sample_settings
-from urc.runtime.missing_packages import missing_packages
+from urc.runtime.missing_packages import MissingPackages, missing_packages
 from urc.runtime.registries import built_in_catalog
 from urc.runtime.server_recorder import NO_ACTOR, ServerRecorder
 from urc.runtime.session import Motion, Session
@@ -164,6 +164,7 @@ async def _serve(
             addresses = ready_addresses(url, place.host, access, certificates, place.tls, foxglove)
             announce(stack, data, addresses)
             on_ready(addresses)
+            _tell_dark_cameras(robots.values())
             _begin_heartbeats(stack, manager, addresses.url)
 
         factory = RobotFactory(robot_options)
@@ -200,12 +201,27 @@ async def _serve(
     return 0
 
 
+def _missing(robot: Robot) -> MissingPackages:
+    return missing_packages(robot.profile, robot.settings, built_in_catalog().transports)
+
+
 def _warn_of_packages(robot: Robot) -> None:
-    """Report a robot that no page can open, or without video, because of a missing extra."""
-    transports = built_in_catalog().transports
-    missing = missing_packages(robot.profile, robot.settings, transports)
-    for text in missing.of(robot.profile.name, "cannot be opened"):
-        complain(f"urc: {text}")
+    """Report a robot that no page can open because of a missing extra."""
+    for text in _missing(robot).needed:
+        complain(f"urc: {robot.profile.name} cannot be opened: {text}")
+
+
+def _tell_dark_cameras(robots: Iterable[Robot]) -> None:
+    """Print one line for each extra without which some of the robots show no video.
+
+    The line follows the dashboard's address, because these robots work without their cameras.
+    """
+    blind: dict[str, list[str]] = {}
+    for robot in robots:
+        for text in _missing(robot).cameras:
+            blind.setdefault(text, []).append(robot.profile.name)
+    for text, names in blind.items():
+        complain(f"no video of {', '.join(names)}: {text}")
 
 
 def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, DashboardAddress]:

@@ -30,7 +30,7 @@ def warn_without_encoder(profile: Profile) -> None:
     """Report an emulated robot whose cameras send no video on this machine."""
     from urc.simulator.servers.camera import has_encoder  # only for emulated robots
 
-    if has_encoder() or all(one.type != "camera" for one in profile.driver.transports.values()):
+    if has_encoder() or not any(one.is_camera for one in profile.driver.transports.values()):
         return
     complain(
         f"urc: the emulated {profile.name} sends no video, which requires av; to install it:"

@@ -5,7 +5,7 @@
 
 from typing import Final, NamedTuple
 
-__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "VIDEO_LINES", "VIDEO_TYPES"]
+__all__ = ["BYTE_LINES", "CARRIERS", "MESSAGING", "VIDEO_TYPES"]
 __all__ += ["MessageTransportRules"]
 
 
@@ -27,8 +27,6 @@ MESSAGING: Final = {
     "http": MessageTransportRules(("request",), ("stream", "every")),
 }
 BYTE_LINES: Final = frozenset(("tcp", "udp", "serial", "ssh", "telnet", "websocket", "camera"))
-VIDEO_LINES: Final = frozenset(("camera",))
-"""Transport types that deliver only access units of a video, and accept no data."""
 VIDEO_TYPES: Final = {
     "foxglove.CompressedVideo",
     "ffmpeg_image_transport_msgs/FFMPEGPacket",

@@ -108,6 +108,15 @@ class TransportSpec(NamedTuple):
         """Whether the topics of this transport are Zenoh keys."""
         return self.type == "zenoh"
 
+    @property
+    def is_camera(self) -> bool:
+        """Whether this is the video of a camera, which accepts no data and moves nothing.
+
+        Cameras therefore stay out of the guard. Their data is not recorded as traffic, because
+        their signals contain all of it.
+        """
+        return self.type == "camera"
+
 
 class Reply(NamedTuple):
     """The reply to a request; a frame that matches one of `errors` reports a failure."""

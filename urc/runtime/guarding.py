@@ -17,7 +17,7 @@ from urc.motion.stall import STALLED_S, WAITED_S
 from urc.registry import Table
 from urc.runtime.clock import Clock
 from urc.runtime.held_commands import is_lossy, period_of, restored_s
-from urc.runtime.transport_chain import UNGUARDED, BuiltTransport, make_lines
+from urc.runtime.transport_chain import BuiltTransport, make_lines
 
 __all__ = ["start_guard_client"]
 
@@ -51,7 +51,7 @@ def start_guard_client(
         UrcError: a transport cannot be built with these settings.
     """
     made = make_lines(driver, settings, table).values()
-    lines = [_line(one, driver) for one in made if one.spec.type not in UNGUARDED]
+    lines = [_line(one, driver) for one in made if not one.spec.is_camera]
     held = {
         name: _held(one, driver) for name, one in driver.commands.items() if one.hold is not None
     }

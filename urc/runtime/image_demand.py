@@ -33,8 +33,6 @@ MAX_LIVE_S: Final = 10.0
 for longer would look live to the next viewer, although the robot may have sent a newer one."""
 _TRANSPORTS: Final = ("ros",)
 """Transport types that can subscribe and unsubscribe during a connection."""
-_CAMERAS: Final = ("camera",)
-"""Transport types that end their connection during a pause, so silence is expected."""
 _IMAGES: Final = ("image", "point_cloud", "video")
 """Types of the signals whose topics may be paused: frequent messages with many bytes."""
 
@@ -71,7 +69,7 @@ def pausable_topics(driver: Driver, settings: Mapping[str, Value]) -> dict[str, 
     }
     found, lows = {}, low_streams(driver)
     for name, spec in driver.transports.items():
-        if spec.type in _CAMERAS:
+        if spec.is_camera:  # its connection ends during a pause, so silence is expected
             fields = _fields_of(driver, name)
             topics = {"": fields} if fields and fields <= images else {}
             if name in lows:
@@ -95,7 +93,7 @@ def low_streams(driver: Driver) -> dict[str, frozenset[str]]:
     return {
         name: _fields_of(driver, name)
         for name, spec in driver.transports.items()
-        if spec.type in _CAMERAS and spec.options.get("streams")
+        if spec.is_camera and spec.options.get("streams")
     }
 
 

@@ -67,7 +67,7 @@ def check_hosts(profile: Profile) -> None:
 def _is_listener(spec: TransportSpec) -> bool:
     """Return whether the URL is an address of this machine at which a camera's data arrives."""
     texts = [_text(url) for url in urls_of(spec.options)]
-    return spec.type == "camera" and all(one.lower().startswith("udp://") for one in texts)
+    return spec.is_camera and all(one.lower().startswith("udp://") for one in texts)
 
 
 def _fixed(options: Mapping[str, object]) -> str:

@@ -8,7 +8,7 @@ from urc.model.values import Value
 from urc.problems import UrcError
 from urc.registry import Table
 from urc.runtime.document_tests import sample_settings
-from urc.runtime.transport_chain import UNGUARDED, absent_cameras, alone, make_transports
+from urc.runtime.transport_chain import absent_cameras, alone, make_transports
 from urc.transports.base import MissingPackage
 
 __all__ = ["MissingPackages", "dark_videos", "missing_packages"]
@@ -68,11 +68,17 @@ def missing_packages(
     )
 
 
-def dark_videos(profile: Profile, table: Table) -> frozenset[str]:
-    """Return the signals of cameras whose package is missing; they never have an image."""
+def dark_videos(profile: Profile, settings: Mapping[str, Value], table: Table) -> frozenset[str]:
+    """Return the signals of cameras whose package is missing; they never have an image.
+
+    Args:
+        profile: the robot's profile.
+        settings: values of the settings, as for `missing_packages`.
+        table: factories of transports by type.
+    """
     driver = profile.driver
-    if all(spec.type not in UNGUARDED for spec in driver.transports.values()):
+    if not any(spec.is_camera for spec in driver.transports.values()):
         return frozenset()
-    absent = absent_cameras(driver, sample_settings(profile.settings), table)
+    absent = absent_cameras(driver, sample_settings(profile.settings) | dict(settings), table)
     dark = (one.read.fields for one in driver.messages.values() if one.transport in absent)
     return frozenset(name for fields in dark for name in fields)

@@ -34,7 +34,7 @@ from urc.runtime.link import Link
 from urc.runtime.motion_controller import MotionFrames
 from urc.runtime.redaction import Redactor
 from urc.runtime.settings import resolve_settings
-from urc.runtime.transport_chain import UNGUARDED, absent_cameras, make_transports, without
+from urc.runtime.transport_chain import absent_cameras, make_transports, without
 from urc.transports.base import GoalRecord, SupportsGoals, Transport
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ class Session:
         self._goals = GoalReports(())  # used without a backend
         if self.backend is not None:
             # Cameras stay out of the guard: they move nothing, and their images are large.
-            cameras = make_transports(driver, self.settings, table, only=UNGUARDED)
+            cameras = make_transports(driver, self.settings, table, only_cameras=True)
             transports = {**self.backend.transports, **cameras}
         else:
             transports = make_transports(driver, self.settings, table)

@@ -7,14 +7,12 @@ process ends with the last of these pages.
 
 import asyncio
 import logging
-import subprocess
-import sys
 from collections.abc import Callable
-from contextlib import suppress
 from importlib.util import find_spec
-from typing import Any, Final
+from typing import Final
 
 from urc._extras import missing
+from urc._helper_process import end_helper, start_helper
 from urc.runtime.still_process import MADE, TAKEN, Still
 
 __all__ = ["StillMaker"]
@@ -83,17 +81,7 @@ class StillMaker:
             await asyncio.sleep(_AGAIN_S)
 
     async def _serve(self) -> None:
-        more: dict[str, Any] = {"start_new_session": True}
-        if sys.platform == "win32":
-            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-        process = await asyncio.create_subprocess_exec(
-            *(sys.executable, "-P", "-m", "urc.runtime.still_process", f"{self._frozen_after_s}"),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            limit=2**18,
-            **more,
-        )
+        process = await start_helper("urc.runtime.still_process", f"{self._frozen_after_s}")
         self._process, self._needs_key = process, True
         try:
             while process.stdout is not None:
@@ -105,10 +93,4 @@ class StillMaker:
                 self._made(self._name, Still(time_s, image, is_repeated))
         finally:
             self._process = None
-            with suppress(ProcessLookupError):
-                process.kill()
-            if process.stdin is not None:
-                process.stdin.close()
-            with suppress(TimeoutError):
-                async with asyncio.timeout(1.0):
-                    await process.wait()
+            await end_helper(process, 1.0)

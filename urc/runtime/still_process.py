@@ -17,12 +17,13 @@ from fractions import Fraction
 from io import RawIOBase
 from typing import Any, Final, NamedTuple
 
+from urc._helper_process import read_exactly
 from urc.images import MAX_PIXELS
 from urc.runtime.standing_pictures import StandingPictures
 from urc.transports.camera_records import UnitQueue
 from urc.video import MAX_UNIT_BYTES, VideoUnit, read_unit
 
-__all__ = ["EVERY_S", "MADE", "TAKEN", "Still", "StillMakerFault", "main", "stills"]
+__all__ = ["EVERY_S", "MADE", "TAKEN", "Still", "main", "stills"]
 
 TAKEN: Final = struct.Struct(">I")
 MADE: Final = struct.Struct(">Id?")
@@ -31,6 +32,8 @@ EVERY_S: Final = 0.1
 WIDEST: Final = 1280
 """Maximum width of a JPEG image, in pixels; larger images are scaled."""
 MEMORY_BYTES: Final = 2**31
+_MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
+"""Maximum size of an access unit in a record, in bytes."""
 _QUALITY: Final = 5
 """Quantiser of the JPEG encoder: 2 is the best image, 31 the smallest file."""
 _COLUMNS, _ROWS = 20, 15
@@ -38,10 +41,6 @@ _COLUMNS, _ROWS = 20, 15
 _BLOCK: Final = 16
 """Size of an encoder's block, in pixels."""
 _DECODERS: Final = {"avc1": "h264", "hev1": "hevc"}
-
-
-class StillMakerFault(Exception):
-    """Raised for input that is no sequence of records."""
 
 
 class Still(NamedTuple):
@@ -139,26 +138,17 @@ def _jpeg(av: Any, frame: Any) -> bytes:
 def _read(source: RawIOBase, queue: UnitQueue) -> None:
     """Put the records of standard input into the queue until the server closes the pipe."""
     try:
-        while True:
-            (size,) = TAKEN.unpack(_exactly(source, TAKEN.size))
-            if size > MAX_UNIT_BYTES + 4096:
-                raise StillMakerFault
-            value = _exactly(source, size)
+        while (head := read_exactly(source, TAKEN.size)) is not None:
+            (size,) = TAKEN.unpack(head)
+            value = read_exactly(source, size) if size <= _MOST_BYTES else None
+            if value is None:
+                break
             unit = read_unit(value)
             if unit is not None:
                 queue.put(value, is_key=unit.is_key)
-    except (StillMakerFault, OSError):
-        os._exit(0)
-
-
-def _exactly(source: RawIOBase, size: int) -> bytes:
-    data = bytearray()
-    while len(data) < size:
-        piece = source.read(size - len(data))
-        if not piece:
-            raise StillMakerFault
-        data += piece
-    return bytes(data)
+    except OSError:
+        pass
+    os._exit(0)
 
 
 def _taken(queue: UnitQueue) -> Iterator[VideoUnit]:

@@ -1,7 +1,7 @@
 """A driver's transports, ordered so that each tunnel precedes the transports that it carries."""
 
 from collections.abc import Collection, Mapping
-from typing import Final, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from urc.model.driver import Driver, TransportSpec
 from urc.model.values import Value
@@ -18,7 +18,6 @@ from urc.transports.base import (
 )
 
 __all__ = [
-    "UNGUARDED",
     "BuiltTransport",
     "absent_cameras",
     "alone",
@@ -26,10 +25,6 @@ __all__ = [
     "make_transports",
     "without",
 ]
-
-UNGUARDED: Final = frozenset(("camera",))
-"""Transport types that stay in the server's process, because they accept no data and move nothing.
-"""
 
 
 class BuiltTransport(NamedTuple):
@@ -106,7 +101,7 @@ def make_transports(
     settings: Mapping[str, Value],
     table: Table,
     *,
-    only: frozenset[str] | None = None,
+    only_cameras: bool = False,
 ) -> dict[str, Transport]:
     """Return the closed transports by name, in the order of `make_lines`.
 
@@ -114,7 +109,7 @@ def make_transports(
         driver: the loaded driver, without circular tunnels.
         settings: a value for every setting.
         table: table of the available transport types.
-        only: the types of the returned transports; None for all types.
+        only_cameras: whether to return only the transports of cameras.
 
     Raises:
         UrcError: a transport cannot be built with these settings.
@@ -123,7 +118,7 @@ def make_transports(
     return {
         name: made.transport
         for name, made in lines.items()
-        if only is None or made.spec.type in only
+        if made.spec.is_camera or not only_cameras
     }
 
 
@@ -141,7 +136,7 @@ def absent_cameras(
         settings: a value for every setting.
         table: table of the available transport types.
     """
-    cameras = [name for name, spec in driver.transports.items() if spec.type in UNGUARDED]
+    cameras = [name for name, spec in driver.transports.items() if spec.is_camera]
     found: dict[str, MissingPackage] = {}
     if len(cameras) == len(driver.transports):
         return found

@@ -229,7 +229,7 @@ def _videos(driver: Driver) -> Mapping[str, str]:
         message.transport: name
         for message in driver.messages.values()
         for name in message.read.fields
-        if driver.transports[message.transport].type == "camera"
+        if driver.transports[message.transport].is_camera
     }
 
 

@@ -8,13 +8,12 @@ with the connection. While no reader needs the images, the transport stays open 
 import asyncio
 import json
 import logging
-import subprocess
-import sys
 from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any, Final
 from urllib.parse import quote
 
+from urc._helper_process import end_helper, start_helper
 from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, one_line
 from urc.transports._stream_dialer import StreamDialer
@@ -37,6 +36,7 @@ only every 10 s."""
 SILENCE_S: Final = 5.0
 """Maximum time between two images, in seconds; afterwards, the connection counts as lost."""
 RESUME_S: Final = 5.0
+_END_S: Final = 1.0
 _TS_PACKET: Final = 188
 _TS_SYNC: Final = 0x47
 _MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
@@ -51,6 +51,8 @@ class CameraTransport:
         """Store the options, without connecting."""
         self._options = options
         self._connection: _CameraConnection | None = None
+        self._ending: _CameraConnection | None = None
+        """The earlier connection until its end."""
         self._is_open = False
         self._is_paused = False
         self._resumed = asyncio.Event()
@@ -109,15 +111,18 @@ class CameraTransport:
         return not self._is_paused and connection is self._connection
 
     async def _reconnected(self) -> "_CameraConnection":
+        await self._end()
         try:
             return await _connected(self._options, RESUME_S)
         except TransportError as fault:
             raise PeerClosed(str(fault)) from fault
 
     async def _end(self) -> None:
-        connection, self._connection = self._connection, None
-        if connection is not None:
-            await connection.close()
+        if self._connection is not None:
+            self._ending, self._connection = self._connection, None
+        if self._ending is not None:  # after a cancelled call, the next one waits again
+            await self._ending.close()
+            self._ending = None
 
 
 class _CameraConnection:
@@ -127,12 +132,12 @@ class _CameraConnection:
         self._address = address
         self._process: asyncio.subprocess.Process | None = None
         self._feeding: asyncio.Task[None] | None = None
-        self._closers: list[Coroutine[Any, Any, None]] = []
         self._relay: RtspRelay | None = None
         self._reason = ""
         self._started = asyncio.Event()
         self._offer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
         self._has_unit = False
+        self._closing: asyncio.Task[None] | None = None
 
     async def use_relay(self, relay: RtspRelay, job: DemuxJob) -> None:
         """Start the process on a relay."""
@@ -145,19 +150,7 @@ class _CameraConnection:
 
     async def start(self, job: DemuxJob) -> None:
         """Start the process."""
-        # -P: nothing is imported from the current folder. Ctrl-C is meant for the server.
-        command = [sys.executable, "-P", "-m", "urc.transports.camera_process"]
-        more: dict[str, Any] = {"start_new_session": True}
-        if sys.platform == "win32":
-            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-        self._process = await asyncio.create_subprocess_exec(
-            *command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            limit=2**18,
-            **more,
-        )
+        self._process = await start_helper("urc.transports.camera_process")
         # Not an argument: every user of this computer can read arguments, and the URL of the relay
         # contains the password.
         await self.write(json.dumps(job._asdict()).encode() + b"\n")
@@ -247,21 +240,24 @@ class _CameraConnection:
                 self._process.kill()
 
     async def close(self) -> None:
-        """End the process and the connection immediately. The method never raises."""
+        """End the process and the connection immediately. The method never raises.
+
+        If the caller is cancelled, the end still goes on.
+        """
         self._reason = self._reason or CLOSED
         self._kill()
+        if self._closing is None:
+            self._closing = asyncio.create_task(self._close())
+        await asyncio.shield(self._closing)
+
+    async def _close(self) -> None:
         if self._feeding is not None:
             self._feeding.cancel()
             await asyncio.gather(self._feeding, return_exceptions=True)
-        self._kill()  # the task may have started the process meanwhile
         if self._relay is not None:
             await self._relay.close()
-        if self._process is not None:
-            with suppress(TimeoutError):
-                async with asyncio.timeout(1.0):
-                    await self._process.wait()
-            if self._process.stdin is not None:
-                self._process.stdin.close()
+        if self._process is not None:  # the task may have started it meanwhile
+            await end_helper(self._process, _END_S)
 
 
 async def _connected(options: CameraOptions, timeout_s: float) -> _CameraConnection:

@@ -30,10 +30,8 @@ from urc.runtime.alarm_table import FILE as ALARM_FILE
 from urc.runtime.audit import FILE as AUDIT_FILE
 from urc.runtime.audit import AuditLog
 from urc.runtime.audit_entry import AuditEntry
-from urc.runtime.missing_packages import dark_videos
 from urc.runtime.one_shot_commands import can_move
 from urc.runtime.redaction import secret_texts
-from urc.runtime.registries import built_in_catalog
 from urc.runtime.server_recorder import ServerRecorder
 from urc.shipped import vendored
 from urc.web import words
@@ -439,7 +437,7 @@ class _Routes:
             return RedirectResponse(place, status_code=303)
         query = request.query_params
         kept = request.cookies.get(KEPT, "")
-        dark = dark_videos(robot.profile, built_in_catalog().transports)
+        dark = self.fleet.dark_videos(name)
         interface = chosen(robot.profile, query.get("interface"), kept, dark=dark)
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface with that name."))

@@ -1,5 +1,6 @@
 """Robots with a camera on a computer without the extra `video`."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,8 @@ from urc.runtime.session import Motion, Session
 from urc.testing.transport import MemoryTransport
 from urc.transports import camera
 from urc.transports.base import MissingPackage, TransportSetup
-from urc.web.fleet.robots import Robot
+from urc.web.fleet.fleet import Fleet
+from urc.web.fleet.robots import Robot, RobotService
 
 pytestmark = pytest.mark.anyio
 
@@ -92,19 +94,82 @@ def test_only_the_videos_of_cameras_without_a_package_stay_dark(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     profile = profile_of(tmp_path, DRONE.replace("WIRE", WIRE))
-    assert dark_videos(profile, table()) == {"picture"}
+    assert dark_videos(profile, {}, table()) == {"picture"}
     monkeypatch.setattr(camera, "find_spec", lambda _: object())
-    assert dark_videos(profile, table()) == frozenset()
+    assert dark_videos(profile, {}, table()) == frozenset()
 
 
-def test_the_terminal_says_that_only_the_video_is_missing(
+async def test_the_settings_decide_which_package_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """WHEP needs a second package. The sample of the setting would need none of them."""
+    url = '"{{ settings.eye }}"'
+    text = DRONE.replace("WIRE", WIRE).replace('"udp://127.0.0.1:0"', url)
+    setting = 'settings: { eye: { type: string, default: "rtsp://10.0.0.2/" } }\ntransports:\n'
+    profile = profile_of(tmp_path, text.replace("transports:\n", setting))
+    found = {"av": object()}
+    monkeypatch.setattr(camera, "find_spec", found.get)
+    assert dark_videos(profile, {"eye": "rtsp://10.0.0.9/"}, table()) == frozenset()
+    assert dark_videos(profile, {"eye": "whep://10.0.0.9/whep"}, table()) == {"picture"}
+
+
+class Counted:
+    """Counts the questions for the package `av`, which is not installed at first."""
+
+    def __init__(self) -> None:
+        self.questions = 0
+        self.is_installed = False
+
+    def __call__(self, _: str) -> object | None:
+        self.questions += 1
+        return self if self.is_installed else None
+
+
+async def test_a_fleet_looks_again_only_after_a_change(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    profile = profile_of(tmp_path, DRONE.replace("WIRE", WIRE))
+    robot = Robot(profile, {}, open_session=lambda: pytest.fail("nothing opens the robot"))
+    counted = Counted()
+    monkeypatch.setattr(camera, "find_spec", counted)
+    ships = Fleet({"drone": robot}, lambda _, one: RobotService(one))
+    assert ships.dark_videos("drone") == {"picture"}
+    counted.is_installed = True
+    assert ships.dark_videos("drone") == frozenset()
+    questions = counted.questions
+    assert ships.dark_videos("drone") == frozenset()
+    assert counted.questions == questions
+    counted.is_installed = False
+    ships.renew("drone", robot)
+    assert ships.dark_videos("drone") == {"picture"}
+    ships.renew("drone", replace(robot, playback=Playback()))
+    assert ships.dark_videos("drone") == frozenset(), "the recording contains the videos"
+
+
+class Playback:
+    """Of a recording, which nobody plays here."""
+
+    began_s = length_s = position_s = 0.0
+    is_playing, speed = False, 1.0
+
+    def play(self) -> None: ...
+
+    def pause(self) -> None: ...
+
+    def seek(self, position_s: float) -> None: ...
+
+
+def test_the_terminal_says_in_one_line_that_only_videos_are_missing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     profile = profile_of(tmp_path, DRONE.replace("WIRE", WIRE))
     robot = Robot(profile, {}, open_session=lambda: pytest.fail("nothing opens the robot"))
+    other = replace(robot, profile=profile._replace(name="diver"))
     dashboard._warn_of_packages(robot)
+    assert capsys.readouterr().err == "", "before the address, only what no page can open"
+    dashboard._tell_dark_cameras([robot, other])
     said = capsys.readouterr().err
-    assert said.startswith(f"urc: drone shows no video: {NAMED}")
+    assert said.startswith(f"no video of drone, diver: {NAMED}")
     assert said.count("\n") == 1
 
 

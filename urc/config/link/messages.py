@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 from urc.config.form_table import WRITE_FORMS
 from urc.config.link.keys import check_key, check_sent_keys
-from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_LINES, VIDEO_TYPES
+from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_TYPES
 from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
 from urc.model.driver import Driver, TransportSpec
@@ -59,7 +59,7 @@ def _check_video(
         return
     signals = [driver.signals[name] for name in read.fields if name in driver.signals]
     is_video = [one.type == "video" for one in signals]
-    if spec.type in VIDEO_LINES and not ("raw" in part.data and is_video and all(is_video)):
+    if spec.is_camera and not ("raw" in part.data and is_video and all(is_video)):
         problems.error(
             part,
             "wrong-form",
@@ -67,7 +67,7 @@ def _check_video(
             key=True,
             hint="write raw: NAME, where the signal NAME has type: video",
         )
-    elif spec.type in VIDEO_LINES and not all(one.has_capture_time for one in signals):
+    elif spec.is_camera and not all(one.has_capture_time for one in signals):
         problems.error(
             part,
             "misplaced-key",
@@ -77,7 +77,7 @@ def _check_video(
         )
     elif spec.type == "ros" and any(is_video):
         _check_video_message(part, read, driver, problems)
-    elif spec.type not in VIDEO_LINES and any(is_video) and spec.type in (*MESSAGING, *BYTE_LINES):
+    elif not spec.is_camera and any(is_video) and spec.type in (*MESSAGING, *BYTE_LINES):
         problems.error(
             part,
             "wrong-form",
@@ -158,7 +158,7 @@ def _check_send(part: Node | None, spec: TransportSpec | None, problems: Problem
     data = part.data
     form = next((key for key in data if key in WRITE_FORMS), "") if isinstance(data, dict) else ""
     kind = MESSAGING.get(spec.type)
-    if spec.type in VIDEO_LINES:
+    if spec.is_camera:
         problems.error(
             part,
             "wrong-form",

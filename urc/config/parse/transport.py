@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from urc.config.node import Node, Problems
+from urc.config.parse.camera import check_camera
 from urc.config.parse.forms.json_text import compiled_tree, placed_templates
 from urc.config.parse.framing import parse_framing
 from urc.config.parse.headers import check_headers
@@ -64,8 +65,7 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
             or did_you_mean(kind.data, catalog.transports, "types"),
         )
     check_headers(part, problems)
-    if kind.data == "camera":
-        _check_streams(part, problems)
+    check_camera(part, problems)
     encoding = part.text("encoding", "utf-8")
     options = {
         name: _option(inner, problems)
@@ -88,18 +88,6 @@ def parse_transport(part: Node, problems: Problems, catalog: Registries) -> Tran
         never_replies=part.text("replies") == "never",
         hint=part.text("hint"),
     )
-
-
-def _check_streams(part: Node, problems: Problems) -> None:
-    """Report a camera with a stream besides its two streams."""
-    if part.get("streams") is not None and part.get("url") is not None:
-        problems.error(
-            part.must("url"),
-            "wrong-form",
-            "'url' and 'streams' cannot be used together",
-            key=True,
-            hint="write the address under streams: high",
-        )
 
 
 def _framing(part: Node, encoding: str, problems: Problems, catalog: Registries) -> FramingSpec:

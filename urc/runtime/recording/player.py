@@ -9,7 +9,16 @@ import asyncio
 import logging
 import math
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Collection, Generator, Iterable, Mapping, Set
+from collections.abc import (
+    AsyncIterator,
+    Callable,
+    Collection,
+    Generator,
+    Iterable,
+    Iterator,
+    Mapping,
+    Set,
+)
 from contextlib import asynccontextmanager, suppress
 from itertools import islice
 from typing import Final
@@ -36,8 +45,8 @@ FASTEST: Final = 100.0
 REFUSAL: Final = "this is a recording: commands are not sent to a robot"
 _REST_S: Final = 0.25
 """Pause before a repeated recording starts again, in seconds."""
-_AHEAD: Final = 256
-"""Number of messages that are read from the file at once."""
+_AHEAD, _AHEAD_BYTES = 256, 4_194_304
+"""Number of messages, and their bytes, at which a reading of the file ends."""
 
 log = logging.getLogger(__name__)
 
@@ -195,7 +204,7 @@ class Player:
         waiting: deque[RecordedMessage] = deque()
         while True:
             if not waiting:
-                waiting.extend(await asyncio.to_thread(lambda: list(islice(stream, _AHEAD))))
+                waiting.extend(await asyncio.to_thread(_ahead, stream))
             if not waiting or number != self._number:
                 return
             due_ns = self._due_ns()
@@ -271,6 +280,18 @@ class Player:
                     hub.saw(event)
         if samples:
             hub.publish(tuple(samples))
+
+
+def _ahead(stream: Iterator[RecordedMessage]) -> list[RecordedMessage]:
+    """Return the next messages of a stream; the bytes exceed the limit by one message at most."""
+    found: list[RecordedMessage] = []
+    size = 0
+    for message in islice(stream, _AHEAD):
+        found.append(message)
+        size += len(message.data)
+        if size >= _AHEAD_BYTES:
+            break
+    return found
 
 
 def _uncompared(signal: Signal) -> Signal:

@@ -54,8 +54,6 @@ FILES: Final = "files/"
 LOG: Final = "/log"
 DRIVING: Final = "/driving"
 SIGNALS, LINK, WIRE, COMMANDS = "/signals/", "/link/", "/wire/", "/commands/"
-_CAMERA: Final = "camera"
-"""Type of the transports whose data is not recorded as traffic: the signals contain all of it."""
 _LAST_S: Final = 1e9
 _LAST_NS: Final = 2**63 - 1
 """Latest time that all MCAP programs can read, in nanoseconds since 1970."""
@@ -91,7 +89,7 @@ def channels(driver: Driver) -> tuple[McapChannel, ...]:
             found.append(_channel(COMMANDS + command.name, shape))
     for name, spec in driver.transports.items():
         found.append(_channel(LINK + name, LINK_SCHEMA))
-        if spec.type != _CAMERA:
+        if not spec.is_camera:
             found.append(_channel(WIRE + name, object_schema("urc.Wire", _BYTES)))
     found.append(_channel(LOG, LOG_SCHEMA))
     found.append(_channel(DRIVING, object_schema("urc.Driving", _ENTRY)))
@@ -114,7 +112,7 @@ class RecordingEncoder:
         """
         self._signals = driver.signals
         self._commands = driver.commands
-        self._cameras = {name for name, one in driver.transports.items() if one.type == _CAMERA}
+        self._cameras = {name for name, one in driver.transports.items() if one.is_camera}
         self._utc_ns = utc_ns
         self._told_ns = 0
 

@@ -1,11 +1,9 @@
 """The simulator's end of the process that encodes the images of an emulated camera."""
 
 import asyncio
-import subprocess
-import sys
-from contextlib import suppress
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
+from urc._helper_process import end_helper, start_helper
 from urc.problems import UrcError
 from urc.simulator.servers.video_process import FAULT, KEYFRAME, ORDER, RECORD
 
@@ -72,28 +70,11 @@ class VideoEncoder:
         process = self._process
         if process is None:
             return
-        with suppress(ProcessLookupError):
-            process.kill()
-        with suppress(TimeoutError):
-            async with asyncio.timeout(_END_S):
-                await process.wait()
-        if process.stdin is not None:
-            process.stdin.close()
+        await end_helper(process, _END_S)
         self._process, self._limit_s = None, FIRST_S
 
     async def _started(self) -> asyncio.subprocess.Process:
-        # -P: nothing is imported from the current folder. Ctrl-C is meant for the simulator.
-        command = [sys.executable, "-P", "-m", "urc.simulator.servers.video_process"]
-        more: dict[str, Any] = {"start_new_session": True}
-        if sys.platform == "win32":
-            more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-        self._process = await asyncio.create_subprocess_exec(
-            *command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            **more,
-        )
+        self._process = await start_helper("urc.simulator.servers.video_process")
         return self._process
 
 

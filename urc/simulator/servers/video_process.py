@@ -20,6 +20,8 @@ from fractions import Fraction
 from io import RawIOBase
 from typing import Any, BinaryIO, Final
 
+from urc._helper_process import read_exactly
+
 __all__ = [
     "FAULT",
     "KEYFRAME",
@@ -118,22 +120,11 @@ class ImageEncoder:
         return self._decoders[name].decode(self._av.Packet(image))[0]
 
 
-def _read(source: RawIOBase, size: int) -> bytes | None:
-    """Return exactly `size` bytes; None at the end of the input."""
-    data = bytearray()
-    while len(data) < size:
-        piece = source.read(size - len(data))
-        if not piece:
-            return None
-        data += piece
-    return bytes(data)
-
-
 def _serve(source: RawIOBase, target: BinaryIO) -> None:
     encoder = ImageEncoder()
-    while (head := _read(source, ORDER.size)) is not None:
+    while (head := read_exactly(source, ORDER.size)) is not None:
         size, is_key = ORDER.unpack(head)
-        if size > MAX_IMAGE_BYTES or (image := _read(source, size)) is None:
+        if size > MAX_IMAGE_BYTES or (image := read_exactly(source, size)) is None:
             return
         is_key, unit = encoder.encode(image, is_key=bool(is_key))
         target.write(RECORD.pack(len(unit), KEYFRAME if is_key else UNIT) + unit)

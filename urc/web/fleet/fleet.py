@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from starlette.requests import Request
 
+from urc.runtime.missing_packages import dark_videos
+from urc.runtime.registries import built_in_catalog
 from urc.web.fleet.robots import Robot, RobotService
 from urc.web.load.assets import Assets, widget_assets
 from urc.web.load.widget_versions import apart, unified
@@ -54,6 +56,7 @@ class Fleet:
         }
         self.broken: dict[str, BrokenRobot] = {}
         """Unusable robots, keyed by their names in URLs."""
+        self._dark: dict[str, frozenset[str]] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
 
@@ -77,6 +80,7 @@ class Fleet:
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot
         self.services[name] = self._service(name, robot)
+        self._dark.pop(name, None)
         self.broken.pop(name, None)
         self._start(name)
 
@@ -91,6 +95,7 @@ class Fleet:
         robot = self._apart(name, robot)
         self.widgets = _assets({**self.robots, name: robot})
         self.robots[name] = robot
+        self._dark.pop(name, None)
         self.broken.pop(name, None)
         return robot
 
@@ -98,6 +103,7 @@ class Fleet:
         """Remove a robot: stop its motion, then end its session."""
         self.robots.pop(name, None)
         self.broken.pop(name, None)
+        self._dark.pop(name, None)
         self.services.pop(name, None)
         self.widgets = _assets(self.robots)
         task = self._tasks.pop(name, None)
@@ -121,6 +127,20 @@ class Fleet:
         if service.has_goal:
             return t("a running goal")
         return t("a pending stop") if service.is_open else ""
+
+    def dark_videos(self, name: str) -> frozenset[str]:
+        """Return the signals of a robot's cameras whose package is missing.
+
+        The videos of a recording need no package. The result changes only with the robot, or when
+        the missing package is installed.
+        """
+        robot = self.robots[name]
+        if self._dark.get(name) is None or self._dark[name]:
+            is_played, table = robot.playback is not None, built_in_catalog().transports
+            self._dark[name] = (
+                frozenset() if is_played else dark_videos(robot.profile, robot.settings, table)
+            )
+        return self._dark[name]
 
     def is_out_of_reach(self, name: str) -> bool:
         """Return whether a robot has no operator, client or live connection."""

@@ -238,6 +238,27 @@ async def test_one_of_a_moment_is_not_looped_for_ever(clock: FakeClock) -> None:
         assert (played.length_s, played.is_playing) == (0.0, False)
 
 
+async def test_large_messages_are_read_a_few_at_a_time(
+    clock: FakeClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A keyframe of a 4K camera has a megabyte, so a number of messages bounds no memory."""
+    large = [RecordedMessage(START_NS + at * 10**8, "/other", bytes(10**6)) for at in range(60, 99)]
+    read: list[RecordedMessage] = []
+
+    def counted(_: Kept, from_ns: int) -> Iterator[RecordedMessage]:
+        for message in every(large):
+            read.append(message)
+            yield message
+
+    monkeypatch.setattr(Kept, "messages", counted)
+    played = player(clock)
+    async with shown(played) as hub:
+        assert sum(one in large for one in read) <= 5
+        await advance(clock, 12)
+        assert battery(hub) == 10
+        assert len(read) == len(every(large))
+
+
 async def test_nothing_can_be_commanded(clock: FakeClock) -> None:
     async with player(clock).session() as session:
         assert session.backend is None

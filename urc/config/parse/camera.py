@@ -1,0 +1,65 @@
+"""Check for keys of a camera that have no effect with its URL."""
+
+from typing import Final
+
+from urc.config.node import Node, Problems
+
+__all__ = ["check_camera"]
+
+_RTSP: Final = ("rtsp", "rtsps")
+_SIGNED_IN: Final = (*_RTSP, "http", "https", "whep", "wheps")
+_SCHEMES: Final = {
+    "rtp": _RTSP,
+    "host": ("udp",),
+    "auth": _SIGNED_IN,
+    "tls": ("rtsps", "https", "wheps"),
+}
+"""Schemes with which each key has an effect."""
+
+
+def check_camera(part: Node, problems: Problems) -> None:
+    """Report a URL besides streams, and keys without effect if the document states the URL's scheme."""
+    if part.must("type").data != "camera":
+        return
+    _check_streams(part, problems)
+    scheme, mark, _ = part.text("url").lower().partition("://")
+    if not mark or "{{" in scheme:
+        return
+    for key, schemes in _SCHEMES.items():
+        if part.data.get(key) and scheme not in schemes:
+            _refuse(part, key, scheme, schemes, problems)
+    signed_in = part.get("auth")
+    if signed_in is not None and signed_in.text("type") == "bearer" and scheme in _RTSP:
+        problems.error(
+            signed_in,
+            "misplaced-key",
+            f"'type: bearer' has no effect with the url {scheme}://",
+            at="type",
+            hint="RTSP signs in with a user and a password: write type: digest",
+        )
+
+
+def _check_streams(part: Node, problems: Problems) -> None:
+    """Report a camera with a stream besides its two streams."""
+    if part.get("streams") is not None and part.get("url") is not None:
+        problems.error(
+            part.must("url"),
+            "wrong-form",
+            "'url' and 'streams' cannot be used together",
+            key=True,
+            hint="write the address under streams: high",
+        )
+
+
+def _refuse(
+    part: Node, key: str, scheme: str, schemes: tuple[str, ...], problems: Problems
+) -> None:
+    known = " or ".join(f"{one}://" for one in schemes)
+    problems.error(
+        part,
+        "misplaced-key",
+        f"'{key}' has no effect with the url {scheme}://",
+        at=key,
+        key=True,
+        hint=f"remove it: it applies to {known}",
+    )
