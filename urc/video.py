@@ -14,11 +14,14 @@ import re
 import struct
 from typing import Final, NamedTuple
 
-__all__ = ["MAX_UNIT_BYTES", "VideoUnit", "arrival_s", "encode_unit", "read_unit", "with_time"]
+__all__ = ["JPEG", "MAX_UNIT_BYTES", "VideoUnit", "arrival_s", "encode_unit", "read_unit"]
+__all__ += ["with_time"]
 
 MAX_UNIT_BYTES: Final = 4_194_304
 """Maximum size of an access unit, in bytes; a keyframe of a 4K camera has about 1 MB."""
 
+JPEG: Final = "jpeg"
+"""Codec of a unit that is a JPEG file, from a camera of this computer."""
 _SIGN: Final = b"URCV"
 _HEADER: Final = struct.Struct(">4sBBHHd")
 _TIME: Final = struct.Struct(">d")
@@ -32,7 +35,7 @@ class VideoUnit(NamedTuple):
     """An access unit with the properties that a decoder needs."""
 
     codec: str
-    """Codec string of RFC 6381, such as ``avc1.42E01E``."""
+    """Codec string of RFC 6381, such as ``avc1.42E01E``; `JPEG` for a JPEG file."""
     is_key: bool
     """Whether decoding can start with this access unit."""
     width: int

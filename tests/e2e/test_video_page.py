@@ -34,7 +34,7 @@ kind: robot
 name: eye
 title: Eye
 transports:
-  eye: {{ type: camera, url: "udp://127.0.0.1:{port}" }}
+  eye: {{ type: camera, url: "udp://127.0.0.1:{port}"{more} }}
 signals:
   picture: {{ type: video, stale_after: 2s }}
 messages:
@@ -90,11 +90,14 @@ H265: Final = ["-c:v", "libx265", "-preset", "ultrafast", "-x265-params", "log-l
 
 @asynccontextmanager
 async def filmed(
-    folder: Path, urc_process: Callable[..., UrcProcess], *codec: str
+    folder: Path, urc_process: Callable[..., UrcProcess], *codec: str, more: str = ""
 ) -> AsyncIterator[tuple[str, asyncio.subprocess.Process]]:
-    """Film the card and serve it; give the page's address, and ffmpeg."""
+    """Film the card and serve it; give the page's address, and ffmpeg.
+
+    `more` contains further keys of the camera, such as ``, transcode: h264``.
+    """
     port, file = free_port(), folder / "eye.yaml"
-    file.write_text(PROFILE.format(port=port), "utf-8")
+    file.write_text(PROFILE.format(port=port, more=more), "utf-8")
     data = str(folder / "data")
     async with program(*test_card(port, *(codec or H264))) as ffmpeg:
         server = urc_process("serve", str(file), "--port", "0", "--data-dir", data)

@@ -22,6 +22,7 @@ _LOCAL: Final = re.compile(r"(.*\.)?localhost(\.localdomain)?\.?|ip6-(localhost|
 _BEGINS: Final = re.compile(r"127\.|169\.254\.|\[?(::1|fe[89ab][0-9a-f]:)|localhost", re.I)
 """Pattern of a fixed beginning that makes a host local, regardless of the setting after it."""
 _URL: Final = re.compile(r"[a-z]+://(?P<host>\[[^\]]*\]|[^/:?#]*)", re.I)
+_DEVICE: Final = "v4l2:"
 
 
 def is_near(host: str) -> bool:
@@ -74,6 +75,8 @@ def _fixed(options: Mapping[str, object]) -> str:
     """Return a local host that does not depend on a setting, or ""."""
     hosts = [_text(options.get("host"))]
     for text in map(_text, urls_of(options)):
+        if text.lower().startswith(_DEVICE) and "{{" not in text:
+            return text  # a camera of the person who installs the package
         found = _URL.match(text)
         hosts.append(found["host"] if found else text)
     for host in hosts:

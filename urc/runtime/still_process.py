@@ -13,11 +13,11 @@ import sys
 import threading
 import zlib
 from collections.abc import Iterator
-from fractions import Fraction
 from io import RawIOBase
 from typing import Any, Final, NamedTuple
 
 from urc._helper_process import read_exactly
+from urc._image_encoders import jpeg_of
 from urc.images import MAX_PIXELS
 from urc.runtime.standing_pictures import StandingPictures
 from urc.transports.camera_records import UnitQueue
@@ -34,8 +34,6 @@ WIDEST: Final = 1280
 MEMORY_BYTES: Final = 2**31
 _MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
 """Maximum size of an access unit in a record, in bytes."""
-_QUALITY: Final = 5
-"""Quantiser of the JPEG encoder: 2 is the best image, 31 the smallest file."""
 _COLUMNS, _ROWS = 20, 15
 """Numbers of compared blocks in a row and in a column."""
 _BLOCK: Final = 16
@@ -87,7 +85,7 @@ def stills(units: Iterator[VideoUnit], frozen_after_s: float = 0.0) -> Iterator[
             last_s = unit.time_s
             first_s = standing.first_s(unit.time_s) if standing is not None else None
             time_s = unit.time_s if first_s is None else first_s
-            yield Still(time_s, _jpeg(av, frames[-1]), is_repeated=first_s is not None)
+            yield Still(time_s, jpeg_of(av, frames[-1], WIDEST), is_repeated=first_s is not None)
 
 
 def _blocks(frame: Any) -> list[int]:
@@ -119,20 +117,6 @@ def _decoder(av: Any, codec: str) -> Any:
     decoder.thread_count = 1
     decoder.flags |= av.codec.context.Flags.low_delay
     return decoder
-
-
-def _jpeg(av: Any, frame: Any) -> bytes:
-    width, height = frame.width, frame.height
-    if width > WIDEST:
-        width, height = WIDEST, max(2, round(height * WIDEST / width / 2) * 2)
-    plain = frame.reformat(width, height, "yuvj420p")
-    encoder = av.CodecContext.create("mjpeg", "w")
-    encoder.width, encoder.height, encoder.pix_fmt = width, height, "yuvj420p"
-    encoder.time_base = Fraction(1, 30)
-    encoder.options = {"qmin": str(_QUALITY), "qmax": str(_QUALITY)}
-    plain.pts = 0
-    packets = [*encoder.encode(plain), *encoder.encode(None)]
-    return b"".join(bytes(packet) for packet in packets)
 
 
 def _read(source: RawIOBase, queue: UnitQueue) -> None:

@@ -1,9 +1,11 @@
 """The options of the camera transport, for cameras that send H.264 or H.265."""
 
+import re
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Final, NamedTuple
 from urllib.parse import urlsplit
 
+from urc.model.values import NOTHING
 from urc.transports._tls import Tls
 from urc.transports.base import TransportError, TransportSetup
 from urc.transports.web_origin import Credentials, OptionReader, WebOrigin
@@ -11,15 +13,19 @@ from urc.transports.web_origin import Credentials, OptionReader, WebOrigin
 __all__ = ["CameraOptions", "main_url", "read_low_options", "read_options"]
 
 _RTSP_PORT, _RTSPS_PORT = 554, 322
-_SCHEMES = ("rtsp", "rtsps", "http", "https", "udp", "whep", "wheps")
+_SCHEMES = ("rtsp", "rtsps", "http", "https", "udp", "whep", "wheps", "v4l2")
 _LOGINS = ("digest", "basic", "bearer")
+_DEVICE: Final = re.compile(r"/dev/(video[0-9]{1,3}|v4l/[A-Za-z0-9_.:+/-]{1,200})")
+_FORMAT: Final = re.compile(r"[a-z0-9_]{2,32}")
+_SIZE: Final = re.compile(r"[1-9][0-9]{1,4}x[1-9][0-9]{1,4}")
+_NOWHERE: Final = WebOrigin(is_secure=False, host="", port=0, path="")
 
 
 class CameraOptions(NamedTuple):
     """The checked options of a camera transport."""
 
     scheme: str
-    """``rtsp``, ``http``, ``udp`` or ``whep``; the member `place` tells whether TLS is used."""
+    """``rtsp``, ``http``, ``udp``, ``whep`` or ``v4l2``; `place` tells whether TLS is used."""
     place: WebOrigin
     """Target of the connection. For ``udp``, the host is the local address, or "" for all."""
     credentials: Credentials | None
@@ -28,14 +34,24 @@ class CameraOptions(NamedTuple):
     sender: str
     """For ``udp``, the only host whose datagrams count; "" for any host."""
     tls: Tls | None
+    transcode: str = ""
+    """Codec to which other codecs are transcoded: ``h264``, ``h264_software``, ``jpeg``, or ""."""
+    device: str = ""
+    """For ``v4l2``, the path of the device."""
+    device_options: Mapping[str, str] = NOTHING
+    """For ``v4l2``, options of the library: format, size and rate."""
 
     @property
     def address(self) -> str:
         """The camera's address in readable form, without credentials."""
         place = self.place
+        wanted = "JPEG" if self.transcode == "jpeg" else "H.264"
+        more = f", transcoded to {wanted}" if self.transcode else ""
+        if self.scheme == "v4l2":
+            return f"camera {self.device}{more}"
         if self.scheme == "udp":
-            return f"camera udp {place.host or '*'}:{place.port} (listening)"
-        return f"camera {self.scheme}{'s' * place.is_secure}://{place.authority}{place.path}"
+            return f"camera udp {place.host or '*'}:{place.port} (listening){more}"
+        return f"camera {self.scheme}{'s' * place.is_secure}://{place.authority}{place.path}{more}"
 
 
 def main_url(options: Mapping[str, object]) -> object:
@@ -77,10 +93,17 @@ def read_options(setup: TransportSetup) -> CameraOptions:
         raise TransportError("camera: rtp has an effect only with an rtsp:// url")
     if setup.tunnel is not None:
         raise TransportError("camera cannot be tunnelled; remove tunnel")
+    transcode = options.choice("transcode", ("", "h264", "h264_software", "jpeg"), "")
+    if scheme == "v4l2":
+        return _device(options, url)._replace(transcode=transcode)
     if scheme == "udp":
         if options.credentials(("digest", "basic")) is not None:
             raise TransportError("camera: a stream over udp has no sign-in; remove auth")
-        return CameraOptions("udp", _listener(url), None, "udp", sender, None)
+        return CameraOptions("udp", _listener(url), None, "udp", sender, None, transcode)
+    return _remote(options, scheme, url, over)._replace(transcode=transcode)
+
+
+def _remote(options: OptionReader, scheme: str, url: str, over: str) -> CameraOptions:
     plain = scheme.removesuffix("s")
     place = options.place(plain)
     if plain == "rtsp" and urlsplit(url).port is None:
@@ -91,6 +114,25 @@ def read_options(setup: TransportSetup) -> CameraOptions:
     if plain == "rtsp" and credentials is not None and credentials.kind == "bearer":
         raise TransportError("camera: auth with a token has no effect with an rtsp:// url")
     return CameraOptions(plain, place, credentials, over, "", options.tls(place))
+
+
+def _device(options: OptionReader, url: str) -> CameraOptions:
+    """Return the options of a camera of this computer."""
+    path = url.partition("://")[2]
+    if not _DEVICE.fullmatch(path) or ".." in path:
+        raise TransportError(
+            f"camera: url must be a device such as v4l2:///dev/video0, not {url[:80]!r}"
+        )
+    found = {"input_format": options.text("format", "mjpeg")}
+    if not _FORMAT.fullmatch(found["input_format"]):
+        raise TransportError(f"camera: format must be a name, not {found['input_format'][:80]!r}")
+    if size := options.text("size"):
+        if not _SIZE.fullmatch(size):
+            raise TransportError(f"camera: size must be text such as 640x480, not {size[:80]!r}")
+        found["video_size"] = size
+    if rate := options.number("rate", 0, 0, 1000):
+        found["framerate"] = f"{rate:g}"
+    return CameraOptions("v4l2", _NOWHERE, None, "", "", None, device=path, device_options=found)
 
 
 def _listener(url: str) -> WebOrigin:

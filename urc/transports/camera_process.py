@@ -16,7 +16,7 @@ import struct
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from io import RawIOBase
 from typing import Any, BinaryIO, Final
 
@@ -25,25 +25,26 @@ from urc.transports.camera_records import (
     CapturedUnits,
     DemuxJob,
     UnitQueue,
-    put_units,
     record_of,
 )
+from urc.transports.packet_reader import PacketWay, device_time_s, packet_way
 from urc.video import VideoUnit
-from urc.video_reader import UnitReader, VideoFault
+from urc.video_reader import VideoFault
 
 __all__ = ["capture_s", "main"]
 
 MEMORY_BYTES: Final = 2**31
-"""Address space of this process; the libraries need 0.5 GB of it before they start."""
+"""Memory of this process, as address space if it encodes nothing; the libraries need 0.5 GB of
+address space before they start."""
 PROBE_BYTES: Final = 500_000
 PROBE_US: Final = 500_000
 """Data and time for the detection of the stream's format."""
 _NETWORK_S: Final = 0.005
 """Wait for a packet that shows that the library has no more packets in stock, in seconds."""
 _MOST_EARLY: Final = 200
+_NICE: Final = 5
+"""Increment of the nice value of a process that encodes: driving comes before the images."""
 _REFERENCE: Final = struct.Struct("=q")
-_CODECS: Final = {"h264": False, "hevc": True}
-"""Whether the codec is H.265, keyed by the library's name."""
 
 
 class EarlyUnits:
@@ -112,14 +113,14 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
             found = container.streams.video
             if not found:
                 raise VideoFault("the camera's stream contains no video")
-            stream = found[0]
-            name = stream.codec_context.name
-            if name not in _CODECS:
-                raise VideoFault(
-                    f"the camera sends {name}; URC supports H.264 and H.265: select one of them in"
-                    " the camera's settings"
-                )
-            _read_stream(av, container, stream, queue, early, is_hevc=_CODECS[name])
+            way = packet_way(av, job, found[0], time.monotonic(), queue)
+            try:
+                if job.device:
+                    _read_device(container, found[0], way)
+                else:
+                    _read_stream(av, container, found[0], queue, early, way)
+            finally:
+                way.end()
     except av.error.FFmpegError as fault:
         raise VideoFault(_words(av, fault)) from fault
     raise VideoFault("the camera ended the stream")
@@ -132,6 +133,8 @@ def _opened(av: Any, job: DemuxJob, source: RawIOBase) -> Any:
         "fflags": "discardcorrupt",
         "max_delay": "200000",
     }
+    if job.device:
+        return av.open(job.device, format=job.format, options=dict(job.device_options))
     if job.url:
         options = {
             **limits,
@@ -152,39 +155,42 @@ def _read_stream(
     stream: Any,
     queue: UnitQueue,
     early: EarlyUnits,
-    *,
-    is_hevc: bool,
+    way: PacketWay,
 ) -> None:
-    extra, dated = stream.codec_context.extradata or b"", CapturedUnits()
-    reader = UnitReader(is_hevc=is_hevc, extra=_plain(extra), began_s=time.monotonic())
-    convert = None
-    if extra and not _has_start_code(extra):  # MP4: lengths instead of start codes
-        name = "hevc_mp4toannexb" if is_hevc else "h264_mp4toannexb"
-        convert = av.BitStreamFilterContext(name, stream)
+    dated, convert = CapturedUnits(), _converter(av, stream)
     asked_s = time.monotonic()
     for packet in container.demux(stream):
         came_s = time.monotonic()
         has_data = packet.size > 0  # the filter empties the packet
         if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
-            put_units(early.stamped(), queue)
+            way.put(early.stamped())
         captured_s = capture_s(packet)  # the filter drops it
-        packets: Iterable[Any] = [packet] if convert is None else convert.filter(packet)
-        for one in packets if has_data else ():
-            unit = reader.unit(bytes(one), came_s)
+        for one in convert(packet) if has_data else ():
+            unit = way.read(bytes(one), bool(one.is_keyframe), came_s)
             if unit is not None and early.is_over:
-                put_units([dated.aged(unit, captured_s, queue)], queue)
+                way.put([dated.aged(unit, captured_s, queue)])
             elif unit is not None:
                 early.add(unit, None if one.pts is None else float(one.pts * one.time_base))
         asked_s = time.monotonic()
 
 
-def _has_start_code(data: bytes) -> bool:
-    return data.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01"))
+def _read_device(container: Any, stream: Any, way: PacketWay) -> None:
+    """Read a camera of this computer, which keeps no images while the library opens it."""
+    for packet in container.demux(stream):
+        if packet.size > 0:
+            time_s = device_time_s(packet, time.monotonic())
+            unit = way.read(bytes(packet), bool(packet.is_keyframe), time_s)
+            way.put([unit] if unit is not None else [])
 
 
-def _plain(extra: bytes) -> bytes:
-    """Return parameter sets with start codes; b"" if the container stores them differently."""
-    return extra if _has_start_code(extra) else b""
+def _converter(av: Any, stream: Any) -> Callable[[Any], Iterable[Any]]:
+    """Return the conversion of packets of MP4, which have lengths instead of start codes."""
+    name = {"h264": "h264_mp4toannexb", "hevc": "hevc_mp4toannexb"}.get(stream.codec_context.name)
+    extra = stream.codec_context.extradata or b""
+    if name is None or not extra or extra.startswith((b"\x00\x00\x01", b"\x00\x00\x00\x01")):
+        return lambda packet: [packet]
+    filtered: Callable[[Any], Iterable[Any]] = av.BitStreamFilterContext(name, stream).filter
+    return filtered
 
 
 def _words(av: Any, fault: Exception) -> str:
@@ -197,18 +203,25 @@ def _words(av: Any, fault: Exception) -> str:
         (errors.InvalidDataError, "the stream is neither H.264 nor H.265 in a known format"),
         (errors.TimeoutError, "the camera stopped sending"),
         (errors.EOFError, "the camera ended the stream"),
+        (errors.FileNotFoundError, "this computer has no such device"),
+        (errors.PermissionError, "URC may not open the device: add its user to the group video"),
     ):
         if isinstance(fault, kind):
             return words
     return f"the stream cannot be read ({getattr(fault, 'strerror', fault)})"
 
 
-def _limit_memory() -> None:
+def _limit(job: DemuxJob) -> None:
+    """Limit the memory of this process; if it encodes, also its share of the processor."""
     if sys.platform == "linux":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        # Drivers of graphics cards reserve large parts of the address space, without using them.
+        kind = resource.RLIMIT_DATA if job.transcode else resource.RLIMIT_AS
+        resource.setrlimit(kind, (MEMORY_BYTES, MEMORY_BYTES))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    if job.transcode and hasattr(os, "nice"):
+        os.nice(_NICE)
 
 
 def _end_with(source: RawIOBase) -> None:
@@ -244,20 +257,20 @@ def _read(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
 
         read_whep(job, lambda: _line(source), lambda: _end_with(source), queue)
         return
-    if job.url:
+    if job.url or job.device:
         threading.Thread(target=_end_with, args=(source,), daemon=True).start()
     read_units(job, source, queue)
 
 
 def main() -> int:
     """Run the process; return the exit code."""
-    _limit_memory()
     source, target = os.fdopen(0, "rb", buffering=0), os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # so that no library's text reaches the records
     line = _line(source)
     if not line:
         return 0
     job, queue = DemuxJob(**json.loads(line)), UnitQueue()
+    _limit(job)
     writer = threading.Thread(target=_write_all, args=(queue, target), daemon=True)
     writer.start()
     try:

@@ -57,6 +57,13 @@ class DemuxJob(NamedTuple):
     """For WHEP: IP addresses of the camera, the only targets of packets; otherwise empty."""
     own_hosts: tuple[str, ...] = ()
     """For WHEP: IP addresses of this computer from which packets go to the camera."""
+    device: str = ""
+    """Path of a camera of this computer, such as ``/dev/video0``; `format` is its demuxer."""
+    device_options: tuple[tuple[str, str], ...] = ()
+    """Options of the device's demuxer, such as ``video_size``, with their values."""
+    transcode: str = ""
+    """Codec into which other codecs are encoded: a key of `urc.transports.transcoder.ENCODERS`, or
+    "" to encode nothing."""
 
 
 class UnitQueue:
@@ -95,6 +102,11 @@ class UnitQueue:
             self._units.append((is_key, record))
             self._bytes += len(record)
             self._changed.notify()
+
+    @property
+    def count(self) -> int:
+        """Number of access units in the queue."""
+        return len(self._units)
 
     def tell(self, record: bytes) -> None:
         """Add a record that is no access unit; a newer one replaces it."""

@@ -8,6 +8,7 @@ with the connection. While no reader needs the images, the transport stays open 
 import asyncio
 import json
 import logging
+import os
 from collections.abc import Coroutine
 from contextlib import suppress
 from typing import Any, Final
@@ -17,7 +18,7 @@ from urc._helper_process import end_helper, start_helper
 from urc.model.payload import Envelope, Payload
 from urc.transports._faults import CLOSED, one_line
 from urc.transports._stream_dialer import StreamDialer
-from urc.transports.base import NOTICE, PeerClosed, TransportError
+from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
 from urc.transports.camera_options import CameraOptions
 from urc.transports.camera_records import FAULT, NOTE, OFFER, RECORD, DemuxJob
 from urc.transports.camera_relay import RtspRelay, RtspWatch
@@ -37,6 +38,8 @@ SILENCE_S: Final = 5.0
 """Maximum time between two images, in seconds; afterwards, the connection counts as lost."""
 RESUME_S: Final = 5.0
 _END_S: Final = 1.0
+DEVICE_FORMAT: Final = "v4l2"
+"""The library's name for cameras of this computer."""
 _TS_PACKET: Final = 188
 _TS_SYNC: Final = 0x47
 _MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
@@ -287,7 +290,8 @@ async def _start_rtsp(
         raise
     user = f"{quote(login.user, safe='')}:{quote(login.secret, safe='')}@" if login else ""
     url = f"rtsp://{user}127.0.0.1:{port}{place.path}"
-    await connection.use_relay(relay, DemuxJob(url, "", options.over))
+    job = DemuxJob(url, "", options.over, transcode=options.transcode)
+    await connection.use_relay(relay, job)
 
 
 async def _start_http(
@@ -313,7 +317,7 @@ async def _start_http(
             async with client.answer(request, SILENCE_S) as response:
                 if fault := await fault_of(response):
                     raise PeerClosed(fault)
-                await connection.start(DemuxJob())
+                await connection.start(DemuxJob(transcode=options.transcode))
                 async for piece in response.aiter_raw():
                     await connection.write(piece)
         finally:
@@ -335,7 +339,8 @@ async def _start_udp(
             data = await line.receive()
             is_ts = len(data) % _TS_PACKET == 0 and data[0] == _TS_SYNC
             # A stream without a container begins with a NAL unit; H.265 has longer headers.
-            await connection.start(DemuxJob(format="mpegts" if is_ts else "h264"))
+            found = "mpegts" if is_ts else "h264"
+            await connection.start(DemuxJob(format=found, transcode=options.transcode))
             while True:
                 await connection.write(data)
                 data = await line.receive()
@@ -372,9 +377,24 @@ async def _start_whep(
     connection.feed(converse())
 
 
+async def _start_v4l2(
+    connection: _CameraConnection, options: CameraOptions, timeout_s: float
+) -> None:
+    if not await asyncio.to_thread(os.path.exists, options.device):
+        raise ConnectFailed(f"this computer has no {options.device}")
+    job = DemuxJob(
+        device=options.device,
+        format=DEVICE_FORMAT,
+        device_options=tuple(options.device_options.items()),
+        transcode=options.transcode,
+    )
+    await connection.start(job)
+
+
 _STARTS: Final = {
     "rtsp": _start_rtsp,
     "http": _start_http,
     "udp": _start_udp,
     "whep": _start_whep,
+    "v4l2": _start_v4l2,
 }

@@ -10,13 +10,14 @@ from PIL import Image
 
 from tests.unit.simulator.test_simulated_body import profile_of
 from urc._h264 import info_of, nal_units
+from urc._image_encoders import KEYFRAME_EVERY_S
 from urc.model.driver import TransportSpec
 from urc.simulator.emulated_robot import EmulatedRobot
 from urc.simulator.servers.base import ServerContext
 from urc.simulator.servers.camera_images import KEPT_S, RETRY_S, CameraImages
 from urc.simulator.servers.coloured_picture import picture
 from urc.simulator.servers.video_encoder import EncodedUnit, EncoderFault
-from urc.simulator.servers.video_process import KEYFRAME_EVERY_S, ImageEncoder
+from urc.simulator.servers.video_process import ImageEncoder
 from urc.video import read_unit
 
 pytestmark = pytest.mark.anyio

@@ -7,6 +7,7 @@ from urc.config.link.keys import check_key, check_sent_keys
 from urc.config.messaging import BYTE_LINES, CARRIERS, MESSAGING, VIDEO_TYPES
 from urc.config.node import Node, Problems
 from urc.config.spelling_suggestions import did_you_mean
+from urc.expressions import Template
 from urc.model.driver import Driver, TransportSpec
 from urc.model.payload import ReadSpec
 from urc.model.values import Signal
@@ -16,6 +17,8 @@ __all__ = ["check_messages", "check_via"]
 _VERBS = {verb for one in MESSAGING.values() for verb in one.verbs}
 _NONE = Signal("")
 _ANSWERED = ("call", "goal", "request", "get")
+_SENT = ("image", "video")
+_VIDEOS = ("h264", "hevc")
 
 
 def check_messages(part: Node, driver: Driver, problems: Problems) -> None:
@@ -59,13 +62,16 @@ def _check_video(
         return
     signals = [driver.signals[name] for name in read.fields if name in driver.signals]
     is_video = [one.type == "video" for one in signals]
-    if spec.is_camera and not ("raw" in part.data and is_video and all(is_video)):
+    kind = _sent_type(spec)
+    is_sent = [kind in (one.type, "") and one.type in _SENT for one in signals]
+    if spec.is_camera and not ("raw" in part.data and is_sent and all(is_sent)):
+        known = kind or "video"
         problems.error(
             part,
             "wrong-form",
-            f"{spec.type} delivers only a video",
+            f"{spec.type} delivers only {'images' if known == 'image' else 'a video'}",
             key=True,
-            hint="write raw: NAME, where the signal NAME has type: video",
+            hint=f"write raw: NAME, where the signal NAME has type: {known}",
         )
     elif spec.is_camera and not all(one.has_capture_time for one in signals):
         problems.error(
@@ -85,6 +91,20 @@ def _check_video(
             key=True,
             hint="declare a transport of type: camera, and the signal of this message as an image",
         )
+
+
+def _sent_type(spec: TransportSpec) -> str:
+    """Return the type of a camera's signal: ``video`` or ``image``; "" if a setting decides."""
+    url = spec.options.get("url")
+    source = url.source if isinstance(url, Template) else str(url)
+    made, wanted = spec.options.get("transcode"), spec.options.get("format", "mjpeg")
+    if made is not None:
+        return "" if isinstance(made, Template) else "image" if made == "jpeg" else "video"
+    if not source.lower().startswith("v4l2://"):
+        return "" if source.startswith("{{") else "video"
+    if isinstance(wanted, Template):
+        return ""
+    return "video" if wanted in _VIDEOS else "image"
 
 
 def _check_video_message(part: Node, read: ReadSpec, driver: Driver, problems: Problems) -> None:

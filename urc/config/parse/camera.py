@@ -13,12 +13,16 @@ _SCHEMES: Final = {
     "host": ("udp",),
     "auth": _SIGNED_IN,
     "tls": ("rtsps", "https", "wheps"),
+    **dict.fromkeys(("format", "size", "rate"), ("v4l2",)),
+    "transcode": (*_RTSP, "http", "https", "udp", "v4l2"),
 }
 """Schemes with which each key has an effect."""
+_PASSED: Final = ("mjpeg", "h264", "hevc")
+"""Formats of devices that pass unchanged."""
 
 
 def check_camera(part: Node, problems: Problems) -> None:
-    """Report a URL besides streams, and keys without effect if the document states the URL's scheme."""
+    """Report a URL besides streams, and each key without effect for a stated scheme."""
     if part.must("type").data != "camera":
         return
     _check_streams(part, problems)
@@ -28,6 +32,7 @@ def check_camera(part: Node, problems: Problems) -> None:
     for key, schemes in _SCHEMES.items():
         if part.data.get(key) and scheme not in schemes:
             _refuse(part, key, scheme, schemes, problems)
+    _check_format(part, scheme, problems)
     signed_in = part.get("auth")
     if signed_in is not None and signed_in.text("type") == "bearer" and scheme in _RTSP:
         problems.error(
@@ -48,6 +53,19 @@ def _check_streams(part: Node, problems: Problems) -> None:
             "'url' and 'streams' cannot be used together",
             key=True,
             hint="write the address under streams: high",
+        )
+
+
+def _check_format(part: Node, scheme: str, problems: Problems) -> None:
+    wanted = part.get("format")
+    if scheme != "v4l2" or wanted is None or part.get("transcode") is not None:
+        return
+    if "{{" not in wanted.data and wanted.data not in _PASSED:
+        problems.error(
+            wanted,
+            "missing-key",
+            f"no browser shows {wanted.data} as it is",
+            hint="add transcode: h264, or write format: mjpeg if the camera has it",
         )
 
 

@@ -15,9 +15,9 @@ from urc.model.values import Sample, Signal
 from urc.protocol.readings.readings import Decode
 from urc.protocol.values.payload import Frame, PayloadReader
 from urc.protocol.values.video_message import GAP
-from urc.video import read_unit, with_time
+from urc.video import JPEG, arrival_s, read_unit, with_time
 
-__all__ = ["StampedReader", "capture_paths", "dating", "stamp_s", "with_captures"]
+__all__ = ["StampedReader", "arriving", "capture_paths", "dating", "stamp_s", "with_captures"]
 
 _TYPES: Final = ("image", "video")
 _PLACES: Final[tuple[JsonPath, ...]] = (("header", "stamp"), ("timestamp",))
@@ -124,6 +124,34 @@ def dating(
         return [dated(one, found, now) for one in samples], refused
 
     return decode_dated
+
+
+def arriving(decode: Decode) -> Decode:
+    """Return a variant of `decode` for the JPEG images of a camera of this computer.
+
+    The camera's process states when each image was captured. An image that waits for a busy server
+    therefore becomes older.
+    """
+
+    def decode_arrived(found: Mapping[str, object], now: float) -> tuple[list[Sample], list[str]]:
+        files: dict[str, object] = {}
+        times_s: dict[str, float] = {}
+        faults = []
+        for name, value in found.items():
+            unit = read_unit(value) if isinstance(value, bytes) else None
+            if unit is not None and unit.codec != JPEG:
+                faults.append(
+                    f"{name}: the camera sends a video; declare the signal as type: video"
+                )
+                continue
+            files[name] = value if unit is None else unit.data
+            if unit is not None:
+                times_s[name] = arrival_s(unit, now)
+        samples, refused = decode(files, now)
+        dated = [one._replace(time_s=times_s.get(one.signal, one.time_s)) for one in samples]
+        return dated, [*refused, *faults]
+
+    return decode_arrived
 
 
 def stamp_s(stamp: object) -> float | None:

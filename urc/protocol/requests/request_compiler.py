@@ -19,6 +19,7 @@ from urc.protocol.forms.topics import context_of, paths_by_topic, topic_of
 from urc.protocol.framing.table import build_framing
 from urc.protocol.readings.capture_times import (
     StampedReader,
+    arriving,
     capture_paths,
     dating,
     with_captures,
@@ -77,7 +78,11 @@ class RequestCompiler:
             matchers = [self._message(one.read, context) for one in messages]
             captures = self._captures(spec, messages)
             if any(captures) or any(
-                one.acknowledge or one.log or one.read.collects or self._is_video(one.read)
+                self._is_image_of_camera(spec, one.read)
+                or one.acknowledge
+                or one.log
+                or one.read.collects
+                or self._is_video(one.read)
                 for one in messages
             ):
                 self._react(spec, messages, matchers, captures, context)
@@ -101,6 +106,12 @@ class RequestCompiler:
         signals = self._driver.signals
         return read.form == "json" and any(
             signals[name].type == "video" for name in read.fields if name in signals
+        )
+
+    def _is_image_of_camera(self, spec: TransportSpec, read: ReadSpec) -> bool:
+        signals = self._driver.signals
+        return spec.is_camera and any(
+            signals[name].type == "image" for name in read.fields if name in signals
         )
 
     def _captures(
@@ -133,6 +144,8 @@ class RequestCompiler:
                 stamped = with_captures(one.read, captures[place])
                 reader = StampedReader(build_reader(stamped, context))
                 decode = dating(captures[place], clocks, replies.note_of(name), decode)
+            if self._is_image_of_camera(spec, one.read):
+                decode = arriving(decode)
             if one.read.collects:
                 collectors = {key: Collector(what) for key, what in one.read.collects.items()}
                 kept += collectors.values()

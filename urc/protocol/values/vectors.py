@@ -16,7 +16,7 @@ from urc.images import MAX_PIXELS, picture_size, pixels
 from urc.model.values import Reading, Signal, Value
 from urc.protocol.values.convert import BadValue
 from urc.protocol.values.ros_image import picture_of
-from urc.video import read_unit
+from urc.video import JPEG, read_unit
 
 __all__ = [
     "MAX_BYTES",
@@ -119,6 +119,8 @@ def video_converter(raw: object) -> Reading:
     unit = read_unit(data)
     if unit is None:
         raise BadValue(f"{len(data)} bytes that are no access unit of a video")
+    if unit.codec == JPEG:
+        raise BadValue("the camera sends JPEG images; declare the signal as type: image")
     if unit.width * unit.height > MAX_PIXELS:
         raise BadValue(
             f"an image of {unit.width} by {unit.height} pixels; the limit is {MAX_PIXELS} in total"

@@ -10,6 +10,7 @@ image of one colour, which changes slowly.
 """
 
 import asyncio
+from collections.abc import Mapping
 from importlib.util import find_spec
 from urllib.parse import urlsplit
 
@@ -59,7 +60,9 @@ class CameraServer:
             port = free_port(context.host) if context.is_anywhere else _port(context, url)
             host = reachable(context.host)
             options: dict[str, object] = {"url": f"udp://{host_and_port(host, port)}", "host": host}
-            options |= dict.fromkeys(("auth", "tls", "streams"))
+            options |= dict.fromkeys(("auth", "tls", "streams", "format", "size", "rate"))
+            if _sends_images(context.options):
+                options["transcode"] = "jpeg"
             if not has_encoder():
                 return _silent(options)
             text = f"camera, sends to {host_and_port(host, port)}"
@@ -78,6 +81,13 @@ class CameraServer:
             await asyncio.gather(self._task, return_exceptions=True)
         if self._receiver is not None:
             self._receiver.close()
+
+
+def _sends_images(options: Mapping[str, object]) -> bool:
+    """Return whether the driver expects JPEG images of a camera of its computer."""
+    is_device = str(options.get("url")).lower().startswith("v4l2://")
+    is_video = options.get("transcode") or options.get("format") in ("h264", "hevc")
+    return is_device and not is_video
 
 
 def _silent(options: dict[str, object]) -> Endpoint:

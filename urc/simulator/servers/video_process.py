@@ -16,11 +16,11 @@ import struct
 import sys
 import time
 from collections.abc import Callable
-from fractions import Fraction
 from io import RawIOBase
 from typing import Any, BinaryIO, Final
 
 from urc._helper_process import read_exactly
+from urc._image_encoders import FrameEncoder
 
 __all__ = [
     "FAULT",
@@ -40,14 +40,6 @@ UNIT: Final = b"U"
 FAULT: Final = b"F"
 MAX_IMAGE_BYTES: Final = 8_388_608
 """Maximum size of an image in a record, in bytes."""
-KEYFRAME_EVERY_S: Final = 1.0
-"""Time between two keyframes, in seconds. A new viewer waits for a keyframe."""
-_LIMITED, _BT601 = 1, 5
-"""Range and matrix of the colours, as numbers of the library."""
-_RATE: Final = 30
-"""Highest number of images in a second, from which the encoder computes the level of the stream."""
-_TICKS: Final = 90_000
-"""Units of a time stamp in a second."""
 _NICE: Final = 5
 """Increment of the process's nice value, so that the robot comes before the images."""
 _PNG: Final = b"\x89PNG"
@@ -65,10 +57,7 @@ class ImageEncoder:
 
         self._av: Any = av
         self._clock = clock
-        self._began_s = clock()
-        self._codec: Any = None
-        self._key_s = 0.0
-        self._last_pts = -1
+        self._encoder = FrameEncoder(av, clock())
         self._decoders: dict[str, Any] = {}
 
     def encode(self, image: bytes, *, is_key: bool = False) -> tuple[bool, bytes]:
@@ -81,37 +70,8 @@ class ImageEncoder:
         Raises:
             av.error.FFmpegError: the image is damaged.
         """
-        frame = self._decoded(image)
-        width, height = max(2, frame.width & ~1), max(2, frame.height & ~1)
-        if self._codec is None or (self._codec.width, self._codec.height) != (width, height):
-            self._codec, is_key = self._opened(width, height), True
-        frame = frame.reformat(width=width, height=height, format="yuv420p", dst_color_range="MPEG")
-        now_s = self._clock()
-        is_key = is_key or now_s - self._key_s >= KEYFRAME_EVERY_S
-        if is_key:
-            self._key_s = now_s
-        types = self._av.video.frame.PictureType
-        frame.pict_type = types.I if is_key else types.NONE
-        self._last_pts = max(self._last_pts + 1, round((now_s - self._began_s) * _TICKS))
-        frame.pts = self._last_pts
-        packets = self._codec.encode(frame)
-        return is_key, b"".join(bytes(one) for one in packets)
-
-    def _opened(self, width: int, height: int) -> Any:
-        codec = self._av.CodecContext.create("libx264", "w")
-        codec.width, codec.height, codec.pix_fmt = width, height, "yuv420p"
-        codec.time_base, codec.framerate = Fraction(1, _TICKS), _RATE
-        codec.color_range, codec.colorspace = _LIMITED, _BT601
-        codec.gop_size = 1_000_000  # `encode` chooses the keyframes, by time
-        codec.max_b_frames = 0
-        codec.thread_count = 1
-        codec.options = {
-            "preset": "ultrafast",
-            "tune": "zerolatency",
-            "profile": "baseline",
-            "forced-idr": "1",
-        }
-        return codec
+        (made,) = self._encoder.encode(self._decoded(image), self._clock(), is_key=is_key)
+        return made.is_key, made.data
 
     def _decoded(self, image: bytes) -> Any:
         name = "png" if image.startswith(_PNG) else "mjpeg"
