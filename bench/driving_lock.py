@@ -3,7 +3,8 @@
 A real Chromium drives a robot that declares `stop_after`. The image then stands still, in each of
 the ways that the tests of the driving lock know. Each time is measured from the moment at which the
 image has the declared age until the stop is written. An encoder may also encode a standing picture
-again and again. Some keyframes then have to repeat before the page notices it.
+again and again. Some keyframes then have to repeat before the page notices it. In further trials,
+the process of the server or of the page is frozen.
 
 In the trials of jitter, images arrive every 30 ± 25 ms, and 1 % of them are lost. A stop or a lower
 speed is then false. A trial is repeated if the machine held up the server's event loop for longer
@@ -15,7 +16,7 @@ import os
 import random
 import signal
 import tempfile
-from collections.abc import AsyncIterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -23,6 +24,7 @@ from typing import Final, NamedTuple
 
 from playwright.async_api import Page
 
+from bench.driving_lock_pages import separate_cart
 from bench.figures import distribution, tell
 from bench.harness import Result
 from bench.kept import Kept
@@ -52,7 +54,7 @@ PIECE_S: Final = 20
 """Time of one trial of jitter, in seconds."""
 ROUND: Final = 20
 """Number of trials with the same server."""
-ROUND_OF_VIDEOS: Final = {"video": 6, "standing": 3}
+ROUND_OF_VIDEOS: Final = {"video": 6, "standing": 3, "server": 10, "background": 10}
 """Number of trials with the same cart."""
 MOST_TIMES: Final = 3
 """Maximum number of trials, as a multiple of the required number, if trials are invalid."""
@@ -63,7 +65,10 @@ ENDED_S: Final = 3 * GROUP / RATE
 """Time after which the page takes a moving picture for current again, in seconds."""
 PUSHED_S: Final = 0.4
 """Time for which the robot moves before the image stands still, in seconds."""
-KINDS: Final = ("camera", "decoder", "repetition", "video", "standing")
+KINDS: Final = (
+    *("camera", "decoder", "repetition", "video", "server", "background"),
+    "standing",
+)
 KEYFRAMES: Final = 6
 """Number of keyframes after which the page must have found a standing picture of x264."""
 BOUNDS_MS: Final = {
@@ -275,6 +280,31 @@ async def _standing(
                 await asyncio.sleep(ENDED_S)
 
 
+def _whole(kind: str) -> Callable[[PageMaker, int, Witness, int], AsyncIterator[Trial]]:
+    """Return the trials in which the whole server or the whole page stands still."""
+
+    async def trials(
+        maker: PageMaker, count: int, witness: Witness, seed: int
+    ) -> AsyncIterator[Trial]:
+        loop = asyncio.get_running_loop()
+        with tempfile.TemporaryDirectory() as folder:
+            async with separate_cart(maker, Path(folder)) as stage:
+                for _ in range(count):
+                    await stage.drive()
+                    await asyncio.sleep(PUSHED_S)
+                    witness.begin()
+                    began_s = loop.time()
+                    await stage.stand(kind)
+                    try:
+                        await stage.until_stopped()
+                        took_s = loop.time() - began_s
+                    finally:
+                        await stage.go_on(kind)
+                    yield _trial(kind, took_s, witness, VIDEO_STOP_S)
+
+    return trials
+
+
 async def _jitters(
     maker: PageMaker, count: int, witness: Witness, seed: int
 ) -> AsyncIterator[Trial]:
@@ -306,6 +336,8 @@ _TRIALS: Final = {
     "repetition": _repetitions,
     "video": _videos,
     "standing": _standing,
+    "server": _whole("server"),
+    "background": _whole("background"),
     JITTER: _jitters,
 }
 
