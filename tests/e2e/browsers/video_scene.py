@@ -139,15 +139,18 @@ class VideoScene(Scene):
         """The stamp grows with the time, and the colours are right."""
         self.until(SHOWN)
         time.sleep(1.0)  # what waited meanwhile comes in a burst
-        first, since_s = self.card(), time.monotonic()
+        began_s, first, since_s = time.monotonic(), self.card(), time.monotonic()
         time.sleep(1.0)
-        second, passed_s = self.card(), time.monotonic() - since_s
+        least_s = time.monotonic() - since_s
+        second, most_s = self.card(), time.monotonic() - began_s
         for card in (first, second):
             for place, colour in enumerate(card.colours):
                 assert colour[place] > 190, card
                 assert sum(colour) - colour[place] < 130, card
         shown = (second.number - first.number) % 2**BITS
-        assert abs(shown - RATE * passed_s) <= RATE / 2, f"{shown} images in {passed_s:.2f} s"
+        # A screenshot takes up to seconds, and shows any moment of them.
+        most = RATE * most_s + RATE / 2
+        assert RATE * least_s - RATE / 2 <= shown <= most, f"{shown} images in {most_s:.2f} s"
 
     def is_locked_by_a_freeze(self) -> float:
         """Freeze the film while driving; return the time until the rover's stop, in seconds."""

@@ -99,8 +99,8 @@ def test_puppet_becomes_the_model_that_it_describes() -> None:
     )
     assert profile.slots["charge"].lists == {"series": ("battery",)}
     assert profile.interfaces["default"].layouts == {
-        "landscape": Layout(1, 3, (Slot("battery", 0, 0), Slot("charge", 0, 1, 1, 2))),
-        "portrait": Layout(2, 1, (Slot("battery", 0, 0), Slot("charge", 1, 0))),
+        "landscape": Layout(1, 4, (Slot("battery", 0, 0), Slot("charge", 0, 1, 1, 3))),
+        "portrait": Layout(3, 1, (Slot("battery", 0, 0), Slot("charge", 1, 0, 2, 1))),
     }
     assert list(profile.widgets) == ["battery", "plot"]
     (test,) = profile.tests

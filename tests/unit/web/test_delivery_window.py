@@ -57,8 +57,8 @@ def test_a_busy_line_is_used_and_hardly_anything_waits(rate: float, trip_s: floa
     before, line.waits = line.sent_bytes, []
     line.busy_until(20.0)
     assert (line.sent_bytes - before) / (10 * rate) > 0.75
-    packet_s, permitted_s = LEAST_PART / rate, max(QUEUE_S, trip_s / 4)
-    assert sorted(line.waits)[len(line.waits) * 99 // 100] <= permitted_s + 2 * packet_s
+    part_s, permitted_s = line.window.part_bytes / rate, max(QUEUE_S, trip_s / 4)
+    assert sorted(line.waits)[len(line.waits) * 99 // 100] <= permitted_s + 2 * part_s
     assert line.window.rate == pytest.approx(rate, rel=0.25)
 
 
