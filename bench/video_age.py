@@ -61,19 +61,28 @@ interfaces:
     grid: |
       .
 """
-# The last bytes of a message name its access unit, whatever stands before it.
+# The last bytes of a message name its access unit, whatever stands before it. URC's page receives
+# videos in a worker, which adds the time of arrival.
 ARRIVALS = """
 (() => {
   window.benchArrivals = [];
-  const Real = WebSocket;
-  window.WebSocket = class extends Real {
+  const take = (data, now) => {
+    if (!(data instanceof ArrayBuffer) || data.byteLength < 90) return;
+    window.benchArrivals.push([String(new Uint8Array(data.slice(-48))), now]);
+  };
+  const RealSocket = WebSocket;
+  window.WebSocket = class extends RealSocket {
+    constructor(...words) {
+      super(...words);
+      this.addEventListener("message", ({ data }) => take(data, performance.now()));
+    }
+  };
+  const RealWorker = Worker;
+  window.Worker = class extends RealWorker {
     constructor(...words) {
       super(...words);
       this.addEventListener("message", ({ data }) => {
-        if (!(data instanceof ArrayBuffer) || data.byteLength < 90) return;
-        const now = performance.now();
-        const name = String(new Uint8Array(data.slice(-48)));
-        window.benchArrivals.push([name, now]);
+        take(data?.data, data?.timeMs - performance.timeOrigin);
       });
     }
   };

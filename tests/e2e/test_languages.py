@@ -47,7 +47,7 @@ CUT = """
   for (const el of document.querySelectorAll(WORDS)) {
     if (!seen(el)) continue;
     const { left, right, width } = el.getBoundingClientRect();
-    if (width < 1 || !el.textContent.trim()) continue;
+    if (width < 2 || !el.textContent.trim()) continue; // for screen readers only
     const what = `${el.tagName} ${JSON.stringify(el.textContent.trim().slice(0, 40))}`;
     if (left < -1 || right > innerWidth + 1) found.push(`${what} is beside the screen`);
     const style = getComputedStyle(el);

@@ -48,7 +48,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 async def _recorded(folder: Path) -> Path:
     port, file = free_port(), folder / "eye.yaml"
-    file.write_text(PROFILE.format(port=port), "utf-8")
+    file.write_text(PROFILE.format(port=port, more=""), "utf-8")
     target = folder / "eye.mcap"
     async with program(*test_card(port, *H264)):
         done = await asyncio.to_thread(run, "record", str(file), "--for", "6s", "-o", str(target))

@@ -22,7 +22,7 @@ async def served(
 ) -> tuple[str, UrcProcess]:
     """Serve the profile of a WebRTC camera; return the page's address, and the server."""
     file = folder / "eye.yaml"
-    profile = PROFILE.format(port=port).replace(f"udp://127.0.0.1:{port}", front(port))
+    profile = PROFILE.format(port=port, more="").replace(f"udp://127.0.0.1:{port}", front(port))
     file.write_text(profile, "utf-8")
     server = urc_process("serve", str(file), "--port", "0", "--data-dir", str(folder / "data"))
     found = await server.wait_for_async(r"(http://\S+)")

@@ -27,6 +27,22 @@ async def until(is_true: Callable[[], bool], what: Callable[[], str]) -> None:
         await asyncio.sleep(0.02)
 
 
+class _Parts:
+    """Joins the parts of messages on the page's socket for images."""
+
+    def __init__(self, take: Callable[[bytes], None]) -> None:
+        self._take = take
+        self._waiting = b""
+
+    def take(self, frame: str | bytes) -> None:
+        """Take a part; its first byte has the lowest bit set in a message's last part."""
+        assert isinstance(frame, bytes)
+        self._waiting += frame[1:]
+        if frame[0] & 1:
+            self._take(self._waiting)
+            self._waiting = b""
+
+
 class Readings:
     """What the page is told over its socket: newest values, and how many pictures came."""
 
@@ -42,7 +58,9 @@ class Readings:
         await until(lambda: bool(self.pictures.get(signal)), lambda: f"no image of {signal} came")
 
     def _listen(self, line: WebSocket) -> None:
-        if "/ws" in line.url and "/dev" not in line.url:
+        if "/ws/pictures" in line.url:
+            line.on("framereceived", _Parts(self._take).take)
+        elif "/ws" in line.url and "/dev" not in line.url:
             line.on("framereceived", self._take)
 
     def _take(self, frame: str | bytes) -> None:

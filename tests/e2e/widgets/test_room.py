@@ -157,7 +157,7 @@ async def test_a_small_plot_shows_the_values_that_fit_and_the_number_of_the_othe
         await page.click(".plot-legend > li >> nth=0")
         await expect(page.locator(".plot-rest")).to_have_text(rest)
     assert shown >= 1
-    assert rest == f"{len(names) - shown} more"
+    assert rest == f"{len(names) - shown} more readings"
     assert cut == []
 
 
