@@ -40,6 +40,8 @@ class Told:
         page.on("websocket", self._watch)
 
     def _watch(self, line: WebSocket) -> None:
+        if "/ws/pictures" in line.url:
+            return
         line.on("framereceived", self._take)
         line.on("framesent", self._note)
 

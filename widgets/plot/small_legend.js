@@ -56,9 +56,12 @@ export class SmallLegend {
     }
     rest.toggleAttribute("data-wide", false);
     this.show(items, shown);
-    if (shown === items.length || columns === 1 || shown < 2 || rest.scrollWidth <= rest.clientWidth) return;
-    rest.toggleAttribute("data-wide", true); // its text takes the place of one more entry
-    this.show(items, shown - 1);
+    if (shown === items.length || !isCut(rest)) return;
+    if (columns > 1 && shown > 1) {
+      rest.toggleAttribute("data-wide", true); // its text takes the place of one more entry
+      this.show(items, (shown -= 1));
+    }
+    if (isCut(rest)) write(rest, `+${items.length - shown}`);
   }
 
   /**
@@ -75,6 +78,11 @@ export class SmallLegend {
       if (!rest.isConnected) list.append(rest);
     } else rest.remove();
   }
+}
+
+/** Return whether a text is wider than its place. @param {HTMLElement} el */
+function isCut(el) {
+  return el.scrollWidth > el.clientWidth;
 }
 
 /** Return the width of an entry's content in pixels. @param {Element} item */

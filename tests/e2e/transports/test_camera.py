@@ -324,8 +324,8 @@ async def test_a_codec_that_urc_does_not_know() -> None:
     film = [*FILM, "-c:v", "mpeg2video", "-f", "mpegts", f"udp://127.0.0.1:{port}?pkt_size=1316"]
     async with program("ffmpeg", "-v", "error", *film), line(url=f"udp://127.0.0.1:{port}") as eye:
         assert await reason(eye) == (
-            "the camera sends mpeg2video; URC supports H.264 and H.265: select one of them in the"
-            " camera's settings"
+            "the camera sends mpeg2video; URC passes on H.264 and H.265: select one of them in the"
+            " camera's settings, or write transcode: h264"
         )
 
 
