@@ -88,7 +88,7 @@ async def test_states_come_without_a_reload_and_alarms_come_first(new_page: Page
 
 
 async def test_a_card_says_its_state_and_its_action(new_page: PageMaker) -> None:
-    """Also before the first connection: then it says what is known without one."""
+    """Before the first connection, the profile alone tells it."""
     robots = fleet(2)
     async with running_dashboard(*robots) as address:
         for size in ("phone", "desktop"):

@@ -30,7 +30,7 @@ SLOW_KBIT: Final = 900
 READY_S: Final = 30.0
 WAIT_S: Final = 60.0
 HIGH_PORT, LOW_PORT = 8554, 8555
-"""In a namespace of their own, so nobody else has them."""
+"""In a namespace of their own, so no other program has them."""
 PROFILE: Final = """\
 urc: 1
 kind: robot
@@ -91,7 +91,7 @@ async def seen(page: Page, is_one: Callable[[dict[str, Any]], bool]) -> dict[str
 
 
 def listening(relay: Relay, *ports: int) -> None:
-    """Wait until somebody listens on ports of the far side."""
+    """Wait until programs listen on ports of the far side."""
     calls = "for port in sys.argv[1:]: socket.create_connection(('127.0.0.1', int(port)))"
     script = f"import socket, sys\n{calls}"
     until_s = time.monotonic() + READY_S

@@ -147,7 +147,7 @@ async def test_a_fleet_looks_again_only_after_a_change(
 
 
 class Playback:
-    """Of a recording, which nobody plays here."""
+    """Of a recording, which is not played here."""
 
     began_s = length_s = position_s = 0.0
     is_playing, speed = False, 1.0
