@@ -16,7 +16,7 @@ FLOORS = {
     "__init__": 7,  # the names for Python users: each is imported on first use, from any floor
     "cli": 6,
     "web": 5,
-    "runtime": 4, "simulator": 4, "access": 4,
+    "runtime": 4, "simulator": 4, "access": 4, "fleet": 4,
     "client": 5,
     "wire": 3.5,  # what the server and its clients say to each other: they share nothing else
     "guard": 3.5,  # a landing: it stands on transports and motion, and sessions stand on it

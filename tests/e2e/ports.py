@@ -13,7 +13,7 @@ from contextlib import suppress
 from itertools import cycle
 from pathlib import Path
 
-__all__ = ["free_port"]
+__all__ = ["free_pair", "free_port"]
 
 _FIRST = 10_000
 _SYSTEMS_OWN = Path("/proc/sys/net/ipv4/ip_local_port_range")
@@ -28,6 +28,14 @@ def free_port() -> int:
         if _is_free(port, socket.SOCK_STREAM) and _is_free(port, socket.SOCK_DGRAM):
             return port
     raise AssertionError("there is no free port")
+
+
+def free_pair() -> int:
+    """Return a port that nobody has, and whose next port nobody has either."""
+    first = free_port()
+    while (second := free_port()) != first + 1:
+        first = second
+    return first
 
 
 def _is_free(port: int, kind: socket.SocketKind) -> bool:

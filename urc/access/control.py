@@ -22,6 +22,7 @@ from urc.access.administration import end_sign_ins
 from urc.access.directory import Directory, Identity, Principal, SignIn, Way, digest_of
 from urc.access.grants import AccessError, Grant
 from urc.access.store import AccessStore
+from urc.access.visits import Visit, Visits
 from urc.model.role import Role
 
 __all__ = ["LOCAL_USER", "AccessControl"]
@@ -67,6 +68,7 @@ class AccessControl:
         self._latest = utc()
         self._codes: dict[str, None] = {}
         self._local: dict[str, SignIn] = {}
+        self._visits = Visits()
         program = self._sign_in("token", digest_of(self.key))
         self._program = program
         self.directory = Directory()
@@ -120,6 +122,21 @@ class AccessControl:
         """Return the highest current role of `who` for any robot; None if `who` has no role."""
         return self.directory.best_role(who, self.now())
 
+    # Visitors from other sites
+
+    def visit(self, visit: Visit, lasts_s: float) -> Identity:
+        """Admit a visitor from another site, or prolong the visit; return the identity."""
+        now = self.now()
+        who, is_changed = self._visits.renew(visit, now, now + lasts_s)
+        if is_changed:
+            self._merge()
+        return who
+
+    def end_visits(self, site: str) -> None:
+        """End all visits from a site, for example because its certificate was revoked."""
+        if self._visits.end_site(site):
+            self._merge()
+
     # Changes
 
     async def watch(self) -> None:
@@ -131,6 +148,8 @@ class AccessControl:
         touched_at = self.now()
         while self.store is not None:
             await asyncio.sleep(WATCH_S)
+            if self._visits.end(self.now()):
+                self._merge()
             try:
                 if self.store.may_have_changed() and await asyncio.to_thread(self.store.changed):
                     await self.reload()
@@ -189,14 +208,14 @@ class AccessControl:
     def _merge(self) -> None:
         ends = map(self._stored.end_of, self._stored.sign_ins.values())
         self._next_end = min(ends, default=float("inf"))
-        own = {self._program.id: self._program, **self._local}
+        own = {self._program.id: self._program, **self._local, **self._visits.sign_ins}
         sign_ins = {**self._stored.sign_ins, **own}
         # Use a single assignment, so that no request sees a partial change. The callbacks run
         # afterwards, because each socket checks its rights in the new directory.
         self.directory = Directory(
-            {**self._stored.principals, LOCAL_USER.id: LOCAL_USER},
+            {**self._stored.principals, **self._visits.principals, LOCAL_USER.id: LOCAL_USER},
             sign_ins,
-            {sign_in.digest: sign_in.id for sign_in in sign_ins.values()},
+            {one.digest: one.id for one in sign_ins.values() if one.way != "site"},
         )
         for report in self.on_change:
             report()

@@ -16,7 +16,9 @@ from urc.model.role import Role
 __all__ = ["NOBODY", "Directory", "Identity", "Kind", "Principal", "SignIn", "Way", "digest_of"]
 
 Kind = Literal["person", "device", "program", "guest"]
-Way = Literal["key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token"]
+Way = Literal[
+    "key", "pairing", "passkey", "passphrase", "oidc", "proxy", "link", "token", "site"
+]  # fmt: skip
 """Sign-in method; the audit log records the method for each command."""
 
 

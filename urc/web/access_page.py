@@ -21,6 +21,7 @@ from urc.web.serve.rights import (
     ADMINISTER,
     ANYONE,
     MAINTAIN_ANYWHERE,
+    SITE,
     ProtectedRoute,
     turn_away,
 )
@@ -62,7 +63,7 @@ class AccessMiddleware:
         self._app = app
         self._access = access
         self._open = [
-            one for one in routes if isinstance(one, ProtectedRoute) and one.right == ANYONE
+            one for one in routes if isinstance(one, ProtectedRoute) and one.right in (ANYONE, SITE)
         ]
         self._pages = pages
 

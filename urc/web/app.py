@@ -7,7 +7,7 @@ Layer 5. The module only combines the other modules. `build_app` takes the robot
 import asyncio
 import time
 from collections.abc import AsyncIterator, Collection, Mapping
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from http import HTTPStatus
@@ -25,6 +25,7 @@ from starlette.websockets import WebSocket
 
 from urc import __version__
 from urc.model.profile import Profile
+from urc.problems import UrcError
 from urc.runtime.alarm_store import AlarmStore
 from urc.runtime.alarm_table import FILE as ALARM_FILE
 from urc.runtime.audit import FILE as AUDIT_FILE
@@ -92,6 +93,9 @@ from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
 from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, error_page, robot_page
 from urc.web.show.trust import TrustPages
+from urc.web.sites.robot_names import far_name
+from urc.web.sites.site_network import SiteNetwork
+from urc.web.sites.site_routes import SiteRoutes
 from urc.web.wire import messages as wire
 
 __all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
@@ -136,6 +140,8 @@ class DashboardOptions:
     """Options of the sign-in methods."""
     notifier: AlarmNotifier | None = None
     """Receiver of all robots' new alarms, which sends notifications; None to send none."""
+    network: SiteNetwork | None = None
+    """The fleet of this server; None for a server alone."""
 
 
 _DEFAULT: Final = DashboardOptions()
@@ -177,7 +183,11 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
         ways_in=WaysIn(access, recorder, options.sign_in),
         data=data,
         trust=WidgetTrust.of(options.trusted),
+        network=options.network,
     )
+    if options.network is not None:
+        access.site_visitor = options.network.visit
+        routes.robot_calls.far = options.network.watch.summaries
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)
     access.on_bad_token = partial(record_bad_token, recorder)
@@ -195,6 +205,7 @@ class _Dashboard(Starlette):
     def __init__(self, routes: "_Routes", options: DashboardOptions) -> None:
         self._access = access = routes.access
         self._ways_in = routes.ways_in
+        self._network = routes.network
         self._people = people = routes.people_routes()
         self._allowed_hosts = frozenset(options.allowed_hosts)
         dev = routes.dev
@@ -224,6 +235,7 @@ class _Dashboard(Starlette):
                 *gallery.routes(),
                 *files.routes(),
                 *TrustPages(options.certificates).routes(),
+                *SiteRoutes(lambda: routes.services, routes.contacts.times, __version__).routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
@@ -240,6 +252,8 @@ class _Dashboard(Starlette):
     def build_middleware_stack(self) -> ASGIApp:
         """Wrap the application and its error handlers in the page policy."""
         inner = super().build_middleware_stack()
+        if self._network is not None:
+            inner = self._network.around(inner, self._access)
         door = AccessMiddleware(inner, self._access, self.routes, self._people.pages)
         policy = Policy(
             words.LanguageMiddleware(door), self._access, allowed_hosts=self._allowed_hosts
@@ -268,6 +282,7 @@ class _Routes:
     manager: Manager | None = None
     dev: Dev | None = None
     dev_start: DevStart | None = None
+    network: SiteNetwork | None = None
     gallery: Gallery = field(init=False)
 
     @property
@@ -369,10 +384,12 @@ class _Routes:
     async def lifespan(self, _: Starlette) -> AsyncIterator[None]:
         """Run one session supervisor for each robot until the server ends."""
         try:
-            async with self.fleet.running() as group:
+            async with AsyncExitStack() as stack, self.fleet.running() as group:
                 if self.manager is not None:
                     await self.manager.changed()
                 self.recorder.server("started", __version__)
+                if self.network is not None:
+                    await stack.enter_async_context(self.network.running())
                 tasks = [
                     group.create_task(self.access.run()),
                     group.create_task(self._record_late()),
@@ -417,6 +434,7 @@ class _Routes:
         html = menu_page(
             head,
             {one.name: self.robots[one.name] for one in states.robots if one.name in self.robots},
+            far=[one for one in states.robots if far_name(one.name) is not None],
             states=msgspec.to_builtins(states),
             ways=self.ways,
             drivers=drivers,
@@ -426,23 +444,24 @@ class _Routes:
 
     async def robot(self, request: Request) -> Response:
         name = request.path_params["name"]
-        robot = self.robots.get(name)
+        robot = self.robots.get(name) or await self._far_robot(name)
         if robot is None:
             raise HTTPException(
                 404, words.t("This server has no robot called “{name}”.", name=name)
             )
-        if missing_settings(robot):
+        is_far = name not in self.robots
+        if missing_settings(robot) and not is_far:
             settings = f"/robots/{quote(name, safe='')}/settings"
             place = settings if self.ways.has_managers else "/"
             return RedirectResponse(place, status_code=303)
         query = request.query_params
         kept = request.cookies.get(KEPT, "")
-        dark = self.fleet.dark_videos(name)
+        dark = frozenset() if is_far else self.fleet.dark_videos(name)
         interface = chosen(robot.profile, query.get("interface"), kept, dark=dark)
         if interface is None:
             raise HTTPException(404, words.t("This robot has no interface with that name."))
         visitor = visitor_of(request)
-        is_dev = self.dev is not None and visitor.may(LOCAL)
+        is_dev = self.dev is not None and visitor.may(LOCAL) and not is_far
         asked = RobotPageRequest(
             request.state.nonce,
             tab=query.get("tab", ""),
@@ -451,9 +470,24 @@ class _Routes:
             may_act=visitor.may(DRIVE, name),
             dev_url=dev_url(name) if is_dev else "",
         )
-        shared = ServerParts(self.modules, self.trust, self.ways.has_managers)
+        has_settings = self.ways.has_managers and not is_far
+        shared = ServerParts(self.modules, self.trust, has_settings)
         html = await asyncio.to_thread(robot_page, name, robot, interface, shared, asked)
         return HTMLResponse(html, headers=_PAGE)
+
+    async def _far_robot(self, name: str) -> Robot | None:
+        """Return a robot of another site, made from its document; None if the name has no site.
+
+        Raises:
+            HTTPException: the site cannot be reached, or does not know the robot.
+        """
+        far = far_name(name)
+        if far is None or self.network is None:
+            return None
+        try:
+            return await self.network.watch.robot(far)
+        except UrcError as fault:
+            raise HTTPException(502, str(fault)) from fault
 
     async def health(self, _: Request) -> Response:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)

@@ -37,6 +37,7 @@ from urc.web.api.wire import (
     LeaseAsked,
     MotionAsked,
     RobotList,
+    RobotSummary,
     SignalValues,
 )
 from urc.web.drive.command_runner import COMMAND_TIMEOUT_S, CommandOutcome
@@ -89,6 +90,8 @@ class RobotCalls:
         self._times = times
         self.sessions = ProgramSessions(followed)
         self._limits = RequestLimits()
+        self.far: Callable[[], Iterable[RobotSummary]] = tuple
+        """Function that returns the robots of other sites."""
 
     def endpoints(self) -> dict[str, Endpoint]:
         """Return the endpoints, keyed by call name."""
@@ -118,6 +121,10 @@ class RobotCalls:
             role = visitor.role(name)
             if role is not None and visitor.may(WATCH, name):
                 found.append(summary(name, service, role, self._times(name)))
+        for one in self.far():
+            role = visitor.role(one.name)
+            if role is not None and visitor.may(WATCH, one.name):
+                found.append(msgspec.structs.replace(one, role=role))
         return RobotList(in_order(found), time())
 
     @answers_errors

@@ -137,6 +137,10 @@ class SocketFlow:
         if self._transport:
             self._transport.abort()
 
+    def taken_over(self) -> asyncio.Transport | None:
+        """Return the socket's transport for another protocol; None if the socket has ended."""
+        return None if self.is_closing() else self._transport
+
 
 def _rest() -> None:
     """Do nothing."""

@@ -16,7 +16,11 @@ from urllib.parse import quote
 
 from urc.access.control import LOCAL_USER, AccessControl
 from urc.access.directory import NOBODY, Identity
+from urc.access.visits import Visit
+from urc.fleet.assertion import LASTS_S, SCHEME
 from urc.model.role import Role
+from urc.problems import UrcError
+from urc.web.serve.site_peer import SitePeer
 from urc.web.serve.visitor import Visitor
 
 __all__ = ["PARAMETER", "Access"]
@@ -82,6 +86,9 @@ class Access:
         self.on_bad_token: Callable[[str], None] = _unheard
         """Callback for each request with an unknown, expired or revoked token. The callback's
         argument is the network address."""
+        self.site_visitor: Callable[[SitePeer, str], Visit] = _no_visitors
+        """Function that returns the visit in an assertion of another site. The arguments are the
+        site and the assertion. It raises `UrcError` for an assertion that does not count."""
         self.clock_check: Callable[[], str] = _right_clock
         """Function that returns a warning about a wrong clock; "" for a correct clock. It may
         block."""
@@ -131,6 +138,25 @@ class Access:
             for one in (self.cookie, self.sign_in_cookie, self.device_cookie)
         )
         return Visitor(self, self._seen(next((who for who in found if who != NOBODY), NOBODY)))
+
+    def visitor_from(self, peer: SitePeer, headers: _Headers) -> tuple[Visitor, str]:
+        """Return the visitor of a request from another site, and why its assertion is refused.
+
+        Args:
+            peer: the site, as proven by its certificate.
+            headers: headers of the request, with names in lower case. Without an assertion, the
+                visitor is unknown and may only press STOP.
+        """
+        for name, value in headers:
+            scheme, _, text = value.decode("latin-1").partition(" ")
+            if name == b"authorization" and scheme.lower() == SCHEME.lower():
+                try:
+                    visit = self.site_visitor(peer, text.strip())
+                except UrcError as fault:
+                    return Visitor(self, NOBODY, is_program=True), str(fault)
+                who = self.control.visit(visit, LASTS_S)
+                return Visitor(self, who, is_program=True), ""
+        return Visitor(self, NOBODY, is_program=True), ""
 
     def _holder(self, cookies: Iterable[tuple[str, str]], name: str) -> Identity:
         """Return the identity from the cookies with a given name, or `NOBODY`.
@@ -202,11 +228,13 @@ class Access:
     def role(self, who: Identity, robot: str = "") -> Role | None:
         """Return the current role of `who` for a robot; "" stands for the whole server."""
         tags = self.tags_of(robot) if robot else ()
-        return self.control.role(who, robot, tags) or self.anonymous
+        role = self.control.role(who, robot, tags)
+        return role if who.way == "site" else role or self.anonymous
 
     def best_role(self, who: Identity) -> Role | None:
         """Return the highest current role of `who` for any robot."""
-        return self.control.best_role(who) or self.anonymous
+        role = self.control.best_role(who)
+        return role if who.way == "site" else role or self.anonymous
 
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether a token permits a command; record the use of the token."""
@@ -270,6 +298,11 @@ def _unrecorded(who: Identity, place: str, agent: str) -> None:
 
 def _unheard(place: str) -> None:
     """Ignore an invalid token, because this server has no audit log."""
+
+
+def _no_visitors(peer: SitePeer, text: str) -> Visit:
+    """Refuse all visitors, because this server belongs to no fleet."""
+    raise UrcError("this server belongs to no fleet")
 
 
 def _right_clock() -> str:

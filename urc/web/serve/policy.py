@@ -212,14 +212,19 @@ class Policy:
         nonce = secrets.token_urlsafe(16)
         state = scope.setdefault("state", {})
         state["nonce"] = nonce
-        state["visitor"] = self._access.visitor(
-            scope["headers"], is_secure=scope["scheme"] in ("https", "wss")
-        )
+        refused = ""
+        if (peer := state.get("site")) is not None:
+            state["visitor"], refused = self._access.visitor_from(peer, scope["headers"])
+        else:
+            state["visitor"] = self._access.visitor(
+                scope["headers"], is_secure=scope["scheme"] in ("https", "wss")
+            )
         answer = _Answer(scope, send, nonce)
-        refusal = self._refusal(scope)
+        is_stopping = is_stop(scope.get("method", ""), scope["path"])
+        refusal = (403, refused) if refused and not is_stopping else self._refusal(scope)
         if refusal is not None:
             await answer.refuse(*refusal)
-        elif is_stop(scope.get("method", ""), scope["path"]):
+        elif is_stopping:
             await self._app(scope, _limited(scope, receive), answer.send)
         else:
             client = scope.get("client") or ("",)

@@ -30,6 +30,7 @@ __all__ = [
     "MAINTAIN_SERVER_FRESH",
     "SIGNED_IN",
     "SIGNED_IN_FRESH",
+    "SITE",
     "WATCH",
     "ProtectedRoute",
     "ProtectedSocket",
@@ -52,10 +53,14 @@ class Right(NamedTuple):
     """Whether only the local user has the right."""
     is_fresh: bool = False
     """Whether people must have signed in within the last `FRESH_S` seconds."""
+    is_site: bool = False
+    """Whether only other sites of the fleet have the right, for any visitor there."""
 
     @property
     def refusal(self) -> str:
         """The refusal message for visitors without the right."""
+        if self.is_site:
+            return t("This is for other sites of the fleet.")
         if self.is_local:
             return t("This needs the start key: open the address that URC printed.")
         if self.scope == "server":
@@ -67,6 +72,7 @@ FRESH_S: Final = 300.0
 """Time after a sign-in, in seconds, during which people can change packages, settings and rights.
 After this time, a tablet that was left signed in no longer permits such changes."""
 ANYONE: Final = Right(None)
+SITE: Final = Right(None, "server", is_site=True)
 SIGNED_IN: Final = Right("watch", "anywhere")
 SIGNED_IN_FRESH: Final = Right("watch", "anywhere", is_fresh=True)
 WATCH: Final = Right("watch")
@@ -148,6 +154,8 @@ async def turn_away(scope: Scope, receive: Receive, send: Send, reason: str) -> 
 
 
 def _may(scope: Scope, right: Right) -> bool:
+    if right.is_site:
+        return scope["state"].get("site") is not None
     if scope["state"].get("is_code"):
         return True  # the secret path of frame code; frames send no cookies
     visitor: RightHolder = scope["state"]["visitor"]

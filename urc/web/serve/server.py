@@ -9,7 +9,7 @@ import contextlib
 import ipaddress
 import signal
 import socket
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Protocol, cast
 
@@ -30,7 +30,7 @@ from urc.web.serve.tls_listener import FirstBytes, Handshakes
 from urc.web.serve.tls_port import TlsPort
 from urc.web.wire.messages import INBOUND_BYTES
 
-__all__ = ["FurtherPort", "reachable_urls", "serve"]
+__all__ = ["FurtherPort", "LineDoor", "reachable_urls", "serve"]
 
 SEND_BUFFER_BYTES = 64 * 1024
 UNSENT_BYTES = 8 * 1024
@@ -54,6 +54,16 @@ class FurtherPort(Protocol):
         """Store the port on which the server listens."""
 
 
+class LineDoor(Protocol):
+    """The way in for lines of other sites; see `urc.web.sites.door.SiteDoor`."""
+
+    def open(self, make: Callable[[Mapping[str, Any]], asyncio.Protocol]) -> None:
+        """Serve lines from now on; `make` creates the HTTP protocol of a line."""
+
+    def close(self) -> None:
+        """Refuse all further lines."""
+
+
 async def serve(
     app: ASGIApp,
     *,
@@ -66,6 +76,7 @@ async def serve(
     allowed_hosts: Iterable[str] = (),
     handshakes: Handshakes | None = None,
     further: Sequence[FurtherPort] = (),
+    door: LineDoor | None = None,
 ) -> None:
     """Serve `app` until SIGINT, SIGTERM or cancellation, then close within 3 seconds.
 
@@ -82,6 +93,7 @@ async def serve(
         allowed_hosts: additional names of this machine, for redirects from plain HTTP to HTTPS.
         handshakes: limits on unfinished handshakes; None for the default limits.
         further: additional ports on the same address.
+        door: way in for other sites of the fleet; None for a server without a fleet.
 
     Raises:
         UrcError: the server cannot listen on the address.
@@ -90,6 +102,7 @@ async def serve(
     connection: Callable[..., asyncio.Protocol] = partial(
         HttpConnection, turns=turns, request_s=request_s, most=connections
     )
+    line_connection = connection
     if certificates is not None:
         handshakes = handshakes or Handshakes(certificates.context)
         connection = partial(_first_bytes, handshakes, connection)
@@ -104,9 +117,23 @@ async def serve(
         stack.enter_context(_renewed(certificates, handshakes))
         running = asyncio.ensure_future(server.serve(sockets=listeners))
         await _until_ready(server, running)
+        if door is not None and server.started:
+            stack.callback(door.close)
+            door.open(partial(_line_protocol, server, line_connection))
         if on_ready and server.started:
             on_ready(_first_url(listeners[0], "http" if certificates is None else "https"))
         await _follow(server, running)
+
+
+def _line_protocol(
+    server: "_UvicornServer", connection: Callable[..., asyncio.Protocol], state: Mapping[str, Any]
+) -> asyncio.Protocol:
+    """Return the HTTP protocol for a line of another site, with additions to the request state."""
+    return connection(
+        config=server.config,
+        server_state=server.server_state,
+        app_state={**server.lifespan.state, **state},
+    )
 
 
 def _first_url(listener: socket.socket, scheme: str) -> str:

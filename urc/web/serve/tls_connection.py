@@ -31,16 +31,19 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         make: Callable[[], asyncio.Protocol],
         on_data: Callable[[], None],
         on_end: Callable[[], None],
+        *,
+        hostname: str | None = None,
     ) -> None:
         """Prepare the handshake.
 
         Args:
             tcp: an open transport; this connection becomes its protocol.
-            context: certificate and options of the server.
+            context: certificate and options of this end.
             make: function that creates the upper protocol after the handshake.
             on_data: callback for received handshake data, which `continue_handshake` processes.
             on_end: callback that is called when the handshake has succeeded, has failed or has lost
                 its connection.
+            hostname: name of the server, if this end is the client; None if this end is the server.
         """
         super().__init__()
         self._tcp = tcp
@@ -52,12 +55,16 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
         self._context = context
         self._in = ssl.MemoryBIO()
         self._out = ssl.MemoryBIO()
-        self._tls = context.wrap_bio(self._in, self._out, server_side=True)
+        self._tls = context.wrap_bio(
+            self._in, self._out, server_side=hostname is None, server_hostname=hostname
+        )
         self._protocol: asyncio.BaseProtocol | None = None
         """The upper protocol; None before the handshake and after the connection has ended."""
         self._is_ready = False
         self._is_reading = True
         self._is_closing = False
+        self.fault = ""
+        """Why TLS ended the connection; "" before, and for an ordinary end."""
         self._loop = asyncio.get_running_loop()
 
     # Called by TCP
@@ -108,8 +115,8 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             self.has_replied = self.has_replied or self._out.pending > 0
             self._flush()
             return
-        except (ssl.SSLError, ssl.CertificateError):
-            self._fail()
+        except (ssl.SSLError, ssl.CertificateError) as fault:
+            self._fail(fault)
             return
         self._flush()
         self._is_ready = True
@@ -124,8 +131,8 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
                 data = self._tls.read(READ_BYTES)
             except ssl.SSLWantReadError:
                 break
-            except ssl.SSLError:
-                self._fail()
+            except ssl.SSLError as fault:
+                self._fail(fault)
                 return
             if not data:  # the client has closed the TLS connection
                 if isinstance(self._protocol, asyncio.Protocol):
@@ -136,8 +143,9 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
                 self._protocol.data_received(data)
         self._flush()  # replies of the TLS protocol itself, such as a key update
 
-    def _fail(self) -> None:
+    def _fail(self, fault: ssl.SSLError | ssl.CertificateError) -> None:
         """Send the TLS alert about the failure and close the connection."""
+        self.fault = getattr(fault, "verify_message", "") or fault.reason or str(fault)
         self._flush()
         self._is_closing = True
         self._tcp.close()
@@ -145,6 +153,11 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
     def _flush(self) -> None:
         if self._out.pending and not self._tcp.is_closing():
             self._tcp.write(self._out.read())
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the handshake has succeeded."""
+        return self._is_ready
 
     # Called by the upper protocol
 
@@ -170,8 +183,8 @@ class TlsConnection(asyncio.Transport, asyncio.Protocol):
             return
         try:
             self._tls.write(data)
-        except ssl.SSLError:
-            self._fail()
+        except ssl.SSLError as fault:
+            self._fail(fault)
         else:
             self._flush()
 

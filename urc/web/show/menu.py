@@ -5,11 +5,11 @@ have a `Nav`.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from time import gmtime, strftime
-from typing import Final
+from typing import Final, Protocol
 from urllib.parse import quote
 
 from urc.model.profile import Setting
@@ -21,7 +21,16 @@ from urc.web.show.pages import PageHead, render
 from urc.web.show.robot_address import robot_address
 from urc.web.words import t
 
-__all__ = ["Card", "MenuPage", "Nav", "SettingRow", "NavigationLinks", "menu_page", "setting_row"]
+__all__ = [
+    "Card",
+    "FarRobot",
+    "MenuPage",
+    "Nav",
+    "SettingRow",
+    "NavigationLinks",
+    "menu_page",
+    "setting_row",
+]
 
 _CLAUSE_END: Final = re.compile(r"[,;:]\s|\.(?:\s|$)")
 
@@ -104,6 +113,30 @@ class Card:
     """Start time of the recording; "" if the card does not show a playback."""
 
 
+class FarRobot(Protocol):
+    """A robot of another site; see `urc.web.api.wire.RobotSummary`."""
+
+    @property
+    def name(self) -> str:
+        """Name in URLs of this server, such as ``cart@bern``."""
+
+    @property
+    def title(self) -> str:
+        """Display name."""
+
+    @property
+    def summary(self) -> str:
+        """Short description."""
+
+    @property
+    def tags(self) -> tuple[str, ...]:
+        """The site, followed by the robot's tags."""
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the robot is emulated."""
+
+
 @dataclass(frozen=True, slots=True)
 class MenuPage:
     """Context for ``menu.html.j2``: the served robots."""
@@ -127,6 +160,7 @@ def menu_page(
     ways: NavigationLinks = NavigationLinks(),
     drivers: Mapping[str, str] | None = None,
     broken: Mapping[str, BrokenRobot] | None = None,
+    far: Sequence[FarRobot] = (),
 ) -> str:
     """Return the menu.
 
@@ -137,6 +171,7 @@ def menu_page(
         ways: navigation links of this server.
         drivers: installed package and version of each robot, keyed by robot name.
         broken: unusable robots, keyed by name.
+        far: robots of other sites.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
@@ -144,10 +179,35 @@ def menu_page(
     cards += [
         _broken(name, one, ways) for name, one in (broken or {}).items() if name not in robots
     ]
+    cards += [_far(one) for one in far]
     tags = tuple(sorted({tag for card in cards for tag in card.tags}))
     is_emulated = len(cards) > 1 and all(card.is_emulated for card in cards)
     page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states, is_emulated)
     return render("menu.html.j2", page)
+
+
+def _far(robot: FarRobot) -> Card:
+    """Return the card of a robot of another site."""
+    url = f"/robots/{quote(robot.name, safe='')}/"
+    return Card(
+        name=robot.name,
+        title=robot.title,
+        summary=robot.summary,
+        kind=_kind(robot.summary, robot.title),
+        url=url,
+        link=url,
+        link_label=t("Connect to {title}", title=robot.title),
+        driver="",
+        interface="",
+        tags=robot.tags,
+        rows=(),
+        missing=(),
+        missing_names=(),
+        initials=_initials(robot.title),
+        address=robot.name.rpartition("@")[2],
+        is_live=True,
+        is_emulated=robot.emulated,
+    )
 
 
 def setting_row(setting: Setting, value: Value) -> SettingRow:

@@ -1,0 +1,209 @@
+"""A robot of another site is seen, driven and stopped from here, with its own site in charge."""
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+import urc.client
+from tests.e2e.dashboards import until
+from tests.e2e.fleet.places import Place, keys_of, message, place
+from tests.e2e.transports.certificates import Authority
+from urc.client.remote import RemoteRobot
+from urc.problems import UrcError
+from urc.runtime.open_profile import open_document
+from urc.shipped import shipped
+from urc.testing.dashboard import FakeRobot
+from urc.testing.fleet_bus import FakeFleetNetwork
+from urc.testing.movers import FakeMotionBackend
+from urc.web.sites.site_network import SitePolicy
+
+pytestmark = pytest.mark.anyio
+
+
+class Fleet:
+    """The sites bern, which has the robot, and zug, which has a screen."""
+
+    def __init__(
+        self,
+        authority: Authority,
+        network: FakeFleetNetwork,
+        bern: Place,
+        zug: Place,
+        robot: FakeRobot,
+    ) -> None:
+        self.authority = authority
+        self.network = network
+        self.bern = bern
+        self.zug = zug
+        self.robot = robot
+        self.name = f"{robot.profile.name}@bern"
+
+    def client(self) -> AbstractAsyncContextManager[RemoteRobot]:
+        """Return a program's connection to the robot, through zug."""
+        return urc.client.open(self.zug.url, self.name, token=self.zug.access.key)
+
+    async def listed(self) -> None:
+        """Wait until zug knows the robot."""
+        watch = self.zug.network.watch
+        await self.zug.ask("/api/v1/robots")  # a look at the list requests it
+        await until(lambda: "bern" in watch.sites)
+
+
+@asynccontextmanager
+async def open_fleet(
+    folder: Path,
+    policy: SitePolicy = SitePolicy(),  # noqa: B008 - immutable
+) -> AsyncIterator[Fleet]:
+    """Run both sites."""
+    authority, network = Authority(folder), FakeFleetNetwork()
+    robot = FakeRobot(open_document(shipped("robots") / "turtlebot4.yaml"))
+    async with AsyncExitStack() as stack:
+        bern = await stack.enter_async_context(
+            place(network, keys_of(authority, "bern", folder), robot, policy=policy)
+        )
+        zug = await stack.enter_async_context(place(network, keys_of(authority, "zug", folder)))
+        yield Fleet(authority, network, bern, zug, robot)
+
+
+@pytest.fixture
+async def fleet(tmp_path: Path) -> AsyncIterator[Fleet]:
+    """Run both sites."""
+    async with open_fleet(tmp_path) as made:
+        yield made
+
+
+async def test_the_list_has_the_robots_of_other_sites(fleet: Fleet) -> None:
+    """Their names end with the site, which is also a tag."""
+    await fleet.listed()
+    _, found, _ = await fleet.zug.ask("/api/v1/robots")
+    assert [(one["name"], one["tags"][0]) for one in found["robots"]] == [(fleet.name, "bern")]
+
+
+async def test_the_page_is_made_here_and_its_socket_leads_there(fleet: Fleet) -> None:
+    """The page has this server's policy, and the address of the robot at its site."""
+    status, page, headers = await fleet.zug.ask(f"/robots/{fleet.name}/")
+    assert status == 200
+    assert b"/ws?robot=turtlebot4%40bern" in page
+    assert b"TurtleBot 4" in page
+    assert "default-src 'none'" in headers["content-security-policy"]
+
+
+async def test_readings_arrive_through_the_fleet(fleet: Fleet) -> None:
+    """A program follows the robot as if it were here."""
+    async with fleet.client() as robot:
+        await until(lambda: fleet.robot.is_open)
+        fleet.robot.set_reading("speed", 0.5)
+        sample = await robot.wait_for("speed", timeout=10)
+        assert sample.value == 0.5
+
+
+async def hold(robot: RemoteRobot, seconds: float) -> None:
+    """Hold the robot's stick."""
+    async with robot.drive("drive") as stick:
+        await stick.hold(seconds, speed=0.1)
+
+
+async def test_the_robot_is_driven_and_stops_on_release(fleet: Fleet) -> None:
+    """The lease, the limits and the stop belong to the robot's site."""
+    backend = fleet.robot.backend
+    assert isinstance(backend, FakeMotionBackend)
+    async with fleet.client() as robot:
+        await hold(robot, 0.5)
+        await until(lambda: backend.texts[-1:] == ["drive stop"])
+        assert backend.texts.count("drive speed=0.1 turn=0") > 3
+
+
+async def test_a_cut_network_stops_the_robot_and_healing_moves_nothing(fleet: Fleet) -> None:
+    """The site alone decides: without ticks, the lease of the motion ends."""
+    backend = fleet.robot.backend
+    assert isinstance(backend, FakeMotionBackend)
+    async with fleet.client() as robot:
+        driving = asyncio.create_task(hold(robot, 30))
+        await until(lambda: len(backend.written) > 3)
+        fleet.network.cut("bern", "zug")
+        await until(lambda: backend.texts[-1] == "drive stop")
+        count = len(backend.written)
+        fleet.network.heal()
+        await asyncio.sleep(0.5)
+        assert set(backend.texts[count:]) <= {"drive stop"}
+        with pytest.raises(UrcError):
+            await driving
+
+
+async def test_stop_latches_at_the_robots_site(fleet: Fleet) -> None:
+    """The audit there names the person and the site."""
+    status, said, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}/stop", {})
+    assert status == 200, said
+    _, state, _ = await fleet.bern.ask("/api/v1/robots/turtlebot4/controls")
+    assert state["latched"].endswith("(zug)")
+
+
+async def test_a_stranger_may_press_stop_and_nothing_else(fleet: Fleet) -> None:
+    """As beside the robot, STOP needs no sign-in."""
+    path = f"/api/v1/robots/{fleet.name}"
+    assert (await fleet.zug.ask(f"{path}/controls", key=""))[0] == 401
+    assert (await fleet.zug.ask(path, key=""))[0] == 401
+    origin = {"origin": fleet.zug.url.rstrip("/")}
+    assert (await fleet.zug.ask(f"{path}/stop", {}, key="", more=origin))[0] == 200
+
+
+async def test_a_site_that_cannot_be_reached_is_named(fleet: Fleet) -> None:
+    """STOP is told to have failed, and the list says why the robot is lost."""
+    await fleet.listed()
+    fleet.network.cut("bern", "zug")
+    status, said, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}/stop", {})
+    assert (status, said["message"]) == (502, "the site bern cannot be reached")
+    _, found, _ = await fleet.zug.ask("/api/v1/robots")
+    assert [(one["state"], one["detail"]) for one in found["robots"]] == [
+        ("lost", "the site bern cannot be reached")
+    ]
+
+
+async def test_the_site_grants_less_than_the_fleet_proposes(tmp_path: Path) -> None:
+    """Bern lets visitors watch; a command from zug is refused there."""
+    async with open_fleet(tmp_path, policy=SitePolicy(role="watch")) as fleet:
+        status, said, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}/commands/dock", {})
+        assert (status, said["code"]) == (403, "forbidden")
+        assert not fleet.robot.commands
+        _, found, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}")
+        assert found["robot"]["role"] == "watch"
+
+
+async def test_a_site_may_refuse_all_visitors(tmp_path: Path) -> None:
+    """The reason reaches the visitor in one line; STOP still works."""
+    async with open_fleet(tmp_path, policy=SitePolicy(role=None)) as fleet:
+        path = f"/api/v1/robots/{fleet.name}"
+        status, said, _ = await fleet.zug.ask(path)
+        assert (status, said["message"]) == (
+            403,
+            "the site bern admits no visitors from the site zug",
+        )
+        assert (await fleet.zug.ask(f"{path}/stop", {}))[0] == 200
+
+
+async def test_a_foreign_certificate_and_a_forged_name_get_nothing(tmp_path: Path) -> None:
+    """TLS proves the site; the name on the network is a claim."""
+    (tmp_path / "other").mkdir()
+    foreign = Authority(tmp_path / "other")
+    async with open_fleet(tmp_path) as fleet, AsyncExitStack() as stack:
+        mill = await stack.enter_async_context(
+            place(fleet.network, keys_of(foreign, "mill", tmp_path))
+        )
+        status, said, _ = await mill.ask(f"/api/v1/robots/{fleet.name}")
+        assert status == 502
+        assert said["message"].startswith("no secure connection to the site bern")
+        forged = await stack.enter_async_context(
+            place(fleet.network, keys_of(fleet.authority, "thun", tmp_path), claims="chur")
+        )
+        status, said, _ = await forged.ask(f"/api/v1/robots/{fleet.name}")
+        assert status == 502
+        assert not fleet.robot.opened
+
+
+async def test_a_hello_names_the_session_of_the_site(fleet: Fleet) -> None:
+    """The page's first message comes from the robot's server."""
+    async with fleet.zug.socket(f"/ws?robot={fleet.name}") as line:
+        assert (await message(line, "hello"))["robot"]

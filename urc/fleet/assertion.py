@@ -1,0 +1,138 @@
+"""Assertions: who acts from another site, and what the fleet proposes that this person may do.
+
+Layer 4. The site where a person has signed in signs an assertion with the key of its certificate.
+The other site checks the assertion against the certificate that TLS has proven. It may grant less
+than the assertion proposes. Assertions are JSON Web Tokens (RFC 7519), signed with ES256.
+"""
+
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final, get_args
+
+from urc.model.role import Role
+from urc.problems import UrcError
+
+__all__ = ["LASTS_S", "SCHEME", "Assertion", "BadAssertion", "sign_assertion", "verified_assertion"]
+
+LASTS_S: Final = 30.0
+"""Time for which an assertion is valid, in seconds. Open sockets renew it."""
+SCHEME: Final = "Urc-Site"
+"""Scheme of the HTTP header ``Authorization`` that carries an assertion."""
+_CLOCKS_S: Final = 60.0
+"""Accepted difference between the clocks of two sites, in seconds."""
+_ALGORITHM: Final = "ES256"
+_MAX_BYTES: Final = 4096
+_TEXTS: Final = ("sub", "name", "kind", "sign_in", "robot", "role", "place")
+_LONGEST: Final = 200
+
+
+class BadAssertion(UrcError):
+    """The assertion is not accepted; the message is one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assertion:
+    """A person, device or program of another site, and one robot that it wants to use."""
+
+    principal: str
+    """Identifier at the site that asserts."""
+    name: str
+    kind: str
+    """``person``, ``device``, ``program`` or ``guest``."""
+    sign_in: str
+    """Identifier of the sign-in at the site that asserts."""
+    robot: str
+    """Name of the robot at the site that receives the assertion."""
+    role: Role
+    """Role that the fleet proposes."""
+    place: str = ""
+    """Network address of the person at the site that asserts."""
+
+
+def sign_assertion(
+    assertion: Assertion, *, issuer: str, audience: str, key_pem: bytes, now: float
+) -> str:
+    """Return a signed assertion.
+
+    Args:
+        assertion: the content.
+        issuer: the site that asserts.
+        audience: the site that shall accept the assertion, and no other.
+        key_pem: private key of the issuer's certificate.
+        now: UTC time in seconds since 1970.
+    """
+    from joserfc import jwt  # an extra
+    from joserfc.jwk import ECKey
+
+    claims: dict[str, Any] = {
+        "iss": issuer,
+        "aud": audience,
+        "sub": assertion.principal,
+        "name": assertion.name[:_LONGEST],
+        "kind": assertion.kind,
+        "sign_in": assertion.sign_in,
+        "robot": assertion.robot,
+        "role": assertion.role,
+        "place": assertion.place,
+        "iat": int(now),
+        "exp": int(now + LASTS_S) + 1,
+        "jti": secrets.token_urlsafe(12),
+    }
+    return jwt.encode({"alg": _ALGORITHM}, claims, ECKey.import_key(key_pem))
+
+
+def verified_assertion(
+    text: str, *, issuer: str, audience: str, key_pem: bytes, now: float
+) -> Assertion:
+    """Return the content of an assertion.
+
+    Args:
+        text: the signed assertion.
+        issuer: the site at the other end of the TLS connection.
+        audience: this site.
+        key_pem: public key of the issuer's certificate.
+        now: UTC time in seconds since 1970.
+
+    Raises:
+        BadAssertion: the assertion is damaged, too old, from the future, for another site, or
+            signed by another key.
+    """
+    from joserfc import jwt
+    from joserfc.errors import JoseError
+    from joserfc.jwk import ECKey
+
+    if len(text) > _MAX_BYTES:
+        raise BadAssertion("the assertion is too long")
+    try:
+        claims = jwt.decode(text, ECKey.import_key(key_pem), algorithms=[_ALGORITHM]).claims
+    except (JoseError, ValueError) as fault:
+        raise BadAssertion("the assertion is not signed by the site that sends it") from fault
+    if claims.get("iss") != issuer or claims.get("aud") != audience:
+        raise BadAssertion("the assertion is from or for another site")
+    begins, ends = claims.get("iat"), claims.get("exp")
+    if not isinstance(begins, int) or not isinstance(ends, int):
+        raise BadAssertion("the assertion has no times")
+    if now > ends + _CLOCKS_S or ends - begins > LASTS_S + 2:
+        raise BadAssertion(f"the assertion ended {now - ends:.0f} s ago; compare the sites' clocks")
+    if now < begins - _CLOCKS_S:
+        raise BadAssertion(
+            f"the assertion begins in {begins - now:.0f} s; compare the sites' clocks"
+        )
+    return _parsed(claims)
+
+
+def _parsed(claims: Mapping[str, object]) -> Assertion:
+    texts: dict[str, str] = {}
+    for name in _TEXTS:
+        value = claims.get(name)
+        if not isinstance(value, str) or len(value) > _LONGEST:
+            raise BadAssertion(f"the assertion has no valid {name!r}")
+        texts[name] = value
+    role = next((one for one in get_args(Role) if one == texts["role"]), None)
+    if role is None or texts["kind"] not in ("person", "device", "program", "guest"):
+        raise BadAssertion("the assertion has an unknown role or kind")
+    return Assertion(
+        texts["sub"], texts["name"], texts["kind"], texts["sign_in"], texts["robot"], role,
+        texts["place"],
+    )  # fmt: skip

@@ -1,0 +1,36 @@
+"""Another site at the end of a connection, as proven by its certificate.
+
+Layer 5. Pure.
+"""
+
+from typing import NamedTuple
+
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
+__all__ = ["SitePeer", "site_of"]
+
+
+class SitePeer(NamedTuple):
+    """Another site, whose certificate has been checked."""
+
+    name: str
+    serial: int
+    """Serial number of the certificate."""
+    key_pem: bytes
+    """Public key of the certificate, in PEM format."""
+
+
+def site_of(certificate_der: bytes) -> SitePeer:
+    """Return the site that a checked certificate names.
+
+    Raises:
+        ValueError: the certificate names no site.
+    """
+    certificate = x509.load_der_x509_certificate(certificate_der)
+    found = certificate.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
+    if len(found) != 1:
+        raise ValueError("the certificate names no site")
+    key = certificate.public_key()
+    pem = key.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+    return SitePeer(str(found[0].value), certificate.serial_number, pem)

@@ -1,0 +1,103 @@
+"""The way in from other sites: TLS over lines of the fleet, then the ordinary HTTP server.
+
+Layer 5. The other site proves its name by its certificate. Everything above is the same as for a
+browser's connection: requests, sockets, flow control and limits.
+"""
+
+import asyncio
+import ssl
+from collections.abc import Callable, Mapping
+from typing import Any, Final, cast
+
+from urc.fleet.lines import LineTransport
+from urc.web.serve.site_peer import SitePeer, site_of
+from urc.web.serve.tls_connection import TlsConnection
+
+__all__ = ["HANDSHAKE_S", "SiteDoor"]
+
+HANDSHAKE_S: Final = 5.0
+"""Time limit for the TLS handshake, in seconds."""
+_Make = Callable[[Mapping[str, Any]], asyncio.Protocol]
+
+
+class SiteDoor:
+    """Accepts the lines of other sites for one server."""
+
+    def __init__(
+        self, context: ssl.SSLContext, may_enter: Callable[[SitePeer], bool] = lambda _: True
+    ) -> None:
+        """Create the door, which refuses all lines until `open`.
+
+        Args:
+            context: mutual TLS with the fleet's root certificate.
+            may_enter: function that checks a site's certificate against the revocation list.
+        """
+        self._context = context
+        self._may_enter = may_enter
+        self._make: _Make | None = None
+
+    def open(self, make: _Make) -> None:
+        """Serve lines from now on.
+
+        Args:
+            make: function that creates the HTTP protocol; it receives additions to the state of
+                each request. The key ``site`` contains the `SitePeer`.
+        """
+        self._make = make
+
+    def close(self) -> None:
+        """Refuse all further lines."""
+        self._make = None
+
+    def accept(self) -> asyncio.Protocol:
+        """Return the protocol of a new line."""
+        return _Entering(self)
+
+    def secured(self, line: LineTransport) -> TlsConnection:
+        """Return the TLS connection over a new line."""
+        holder: list[TlsConnection] = []
+
+        def made() -> asyncio.Protocol:
+            return self._admitted(line, holder[0])
+
+        def step() -> None:
+            holder[0].continue_handshake()
+
+        connection = TlsConnection(line, self._context, made, step, lambda: None)
+        holder.append(connection)
+        return connection
+
+    def _admitted(self, line: LineTransport, tls: TlsConnection) -> asyncio.Protocol:
+        der = tls.get_extra_info("ssl_object").getpeercert(binary_form=True)
+        try:
+            peer = site_of(der or b"")
+        except ValueError:
+            return _Refusing()
+        if self._make is None or peer.name != line.site or not self._may_enter(peer):
+            return _Refusing()
+        return self._make({"site": peer})
+
+
+class _Entering(asyncio.Protocol):
+    """A line whose TLS handshake has not begun."""
+
+    def __init__(self, door: SiteDoor) -> None:
+        self._door = door
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        line = cast("LineTransport", transport)
+        tls = self._door.secured(line)
+        line.set_protocol(tls)
+        asyncio.get_running_loop().call_later(HANDSHAKE_S, _end_slow, tls)
+
+
+class _Refusing(asyncio.Protocol):
+    """A site that may not enter."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        cast("asyncio.Transport", transport).abort()
+
+
+def _end_slow(tls: TlsConnection) -> None:
+    if not tls.is_ready and not tls.is_closing():
+        tls.abort()

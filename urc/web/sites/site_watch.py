@@ -1,0 +1,228 @@
+"""The other sites, as known to this dashboard: their robots, states and documents.
+
+Layer 5. A site's list is requested when the site appears, and again while somebody looks at the
+menu. A document is requested when its page opens, checked against its digest, and kept.
+"""
+
+import asyncio
+import hmac
+import logging
+import time
+from collections.abc import Callable
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+import msgspec
+
+from urc.model.profile import Profile
+from urc.model.values import Value
+from urc.private_files import make_private, put_private
+from urc.problems import UrcError
+from urc.runtime.open_profile import open_document
+from urc.shipped import shipped
+from urc.web.api.documents import document_of
+from urc.web.api.wire import RobotSummary
+from urc.web.fleet.robots import Robot, SessionLike
+from urc.web.serve.replies import ApiError
+from urc.web.sites.robot_names import FarName
+from urc.web.sites.site_client import SiteClient, SiteFailed
+from urc.web.sites.site_routes import ROBOTS, SiteList, SiteRobot, digest_of_document
+
+__all__ = ["KnownSite", "SiteWatch"]
+
+LOOK_S: Final = 2.0
+"""Interval between two requests for the list of a site while a menu is open, in seconds."""
+WATCHED_S: Final = 10.0
+"""Time after a look at the menu during which lists are requested, in seconds."""
+FOLDER: Final = "documents"
+"""Folder of the received documents, in the folder of the membership."""
+MAX_ROBOTS: Final = 2000
+"""Maximum number of robots of a site; further robots are ignored."""
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownSite:
+    """The newest list of a site."""
+
+    name: str
+    robots: dict[str, SiteRobot]
+    """Robots by their names at the site."""
+    heard_s: float
+    """Time of the list, on the clock of `SiteWatch`."""
+    version: str = ""
+    """Version of URC at the site."""
+    fault: str = ""
+    """Why the site's list cannot be read now; "" if it can."""
+
+
+class SiteWatch:
+    """The other sites."""
+
+    def __init__(
+        self,
+        client: SiteClient,
+        folder: Path,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Know no site yet.
+
+        Args:
+            client: requests to other sites.
+            folder: folder of the membership.
+            clock: time in seconds.
+        """
+        self._client = client
+        self._folder = folder / FOLDER
+        self._clock = clock
+        self._known: dict[str, KnownSite] = {}
+        self._looked_s = -WATCHED_S
+        self._news = asyncio.Event()
+        self._robots: dict[tuple[str, str], Robot] = {}
+        """Robots by site and digest of their documents."""
+
+    @property
+    def sites(self) -> dict[str, KnownSite]:
+        """All sites that were present since the start, by name."""
+        return self._known
+
+    def is_present(self, site: str) -> bool:
+        """Return whether a site can be reached now."""
+        return site in self._client.sites
+
+    def changed(self) -> None:
+        """Request the lists of sites that have appeared; called when the present sites change."""
+        self._news.set()
+
+    def summaries(self) -> list[RobotSummary]:
+        """Return all robots of other sites, with their names on this server, and note the look.
+
+        Robots of an absent site are lost, with the reason.
+        """
+        if self._clock() - self._looked_s > LOOK_S:
+            self._news.set()
+        self._looked_s = self._clock()
+        found = []
+        for site, known in sorted(self._known.items()):
+            is_here = self.is_present(site)
+            for robot, one in known.robots.items():
+                name = str(FarName(robot, site))
+                summary = msgspec.structs.replace(
+                    one.summary, name=name, tags=(site, *one.summary.tags)
+                )
+                if not is_here:
+                    reason = f"the site {site} cannot be reached"
+                    summary = msgspec.structs.replace(
+                        summary, state="lost", detail=reason, battery=None, holder=""
+                    )
+                found.append(summary)
+        return found
+
+    async def run(self) -> None:
+        """Request lists until cancelled."""
+        while True:
+            is_watched = self._clock() - self._looked_s < WATCHED_S
+            here = self._client.sites
+            wanted = here if is_watched else here - self._known.keys()
+            async with asyncio.TaskGroup() as group:
+                for site in wanted:
+                    group.create_task(self._ask(site))
+            self._news.clear()
+            wait_s = LOOK_S if is_watched or wanted else None
+            try:
+                async with asyncio.timeout(wait_s):
+                    await self._news.wait()
+            except TimeoutError:
+                continue
+
+    async def robot(self, far: FarName) -> Robot:
+        """Return a robot of another site for its page, made from the site's document.
+
+        Raises:
+            UrcError: the robot is unknown, its site cannot be reached, or its document is invalid.
+        """
+        if far.site not in self._known or far.robot not in self._known[far.site].robots:
+            await self._ask(far.site)
+        known = self._known.get(far.site)
+        one = known.robots.get(far.robot) if known is not None else None
+        if one is None:
+            raise UrcError(
+                (known.fault if known is not None else "")
+                or f"the site {far.site} has no robot called {far.robot}"
+            )
+        robot = self._robots.get((far.site, one.digest))
+        if robot is None:
+            profile = await self._profile(far, one.digest)
+            robot = Robot(profile, _defaults(profile), _no_session)
+            self._robots[far.site, one.digest] = robot
+        return replace(robot, is_emulated=one.summary.emulated)
+
+    async def _ask(self, site: str) -> None:
+        before = self._known.get(site)
+        try:
+            async with self._client.request(site, "GET", ROBOTS) as response:
+                body = await response.whole()
+            if response.status != 200:
+                raise SiteFailed(f"the site {site} refuses its list (status {response.status})")
+            found = msgspec.json.decode(body, type=SiteList)
+        except (SiteFailed, msgspec.MsgspecError) as error:
+            log.info("%s", error)
+            robots = before.robots if before is not None else {}
+            version = before.version if before is not None else ""
+            self._known[site] = KnownSite(site, robots, self._clock(), version, str(error))
+            return
+        robots = {one.summary.name: one for one in found.robots[:MAX_ROBOTS]}
+        self._known[site] = KnownSite(site, robots, self._clock(), found.version)
+
+    async def _profile(self, far: FarName, digest: str) -> Profile:
+        if shipped_profile := await asyncio.to_thread(_shipped, far.robot, digest):
+            return shipped_profile
+        file = self._folder / far.site / f"{digest}.yaml"
+        if not await asyncio.to_thread(_is_kept, file, digest):
+            target = f"/fleet/documents/{quote(far.robot, safe='')}"
+            async with self._client.request(far.site, "GET", target) as response:
+                data = await response.whole()
+            if response.status != 200:
+                raise SiteFailed(f"the site {far.site} refuses the document of {far.robot}")
+            if not hmac.compare_digest(digest_of_document(data), digest):
+                raise SiteFailed(f"the document of {far} does not match its digest; try again")
+            await asyncio.to_thread(_keep, file, data)
+        return await asyncio.to_thread(open_document, file)
+
+
+def _defaults(profile: Profile) -> dict[str, Value]:
+    return {name: one.default for name, one in profile.settings.items()}
+
+
+def _shipped(name: str, digest: str) -> Profile | None:
+    """Return the shipped robot with this document, which brings its models and picture."""
+    file = shipped("robots") / f"{name}.yaml"
+    if not file.is_file():
+        return None
+    try:
+        profile = open_document(file)
+        data = document_of(profile)
+    except (UrcError, ApiError):
+        return None
+    return profile if digest_of_document(data) == digest else None
+
+
+def _is_kept(file: Path, digest: str) -> bool:
+    try:
+        return digest_of_document(file.read_bytes()) == digest
+    except OSError:
+        return False
+
+
+def _keep(file: Path, data: bytes) -> None:
+    make_private(file.parent)
+    put_private(file, data)
+
+
+def _no_session() -> AbstractAsyncContextManager[SessionLike]:
+    """Refuse a session: the robot is connected to its own site."""
+    raise UrcError("this robot belongs to another site")
