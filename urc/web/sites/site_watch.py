@@ -1,7 +1,7 @@
 """The other sites, as known to this dashboard: their robots, states and documents.
 
-Layer 5. A site's list is requested when the site appears, and again while somebody looks at the
-menu. A document is requested when its page opens, checked against its digest, and kept.
+Layer 5. A site's list is requested when the site appears, and again while a menu
+is open. A document is requested when its page opens, checked against its digest, and kept.
 """
 
 import asyncio
