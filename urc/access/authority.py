@@ -18,8 +18,9 @@ from typing import Final, NamedTuple
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from urc._x509 import common_name, is_signed_by, key_pem, key_usage
 from urc.access.grants import AccessError
 from urc.access.wrong_clock import RELEASED
 from urc.packages.atomic_files import exclusive
@@ -151,7 +152,7 @@ class CertificateAuthority:
             .issuer_name(self._root.subject)
             .add_extension(x509.SubjectAlternativeName(self._names), critical=False)
             .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
-            .add_extension(_usage(is_authority=False), critical=True)
+            .add_extension(key_usage(is_authority=False), critical=True)
             .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
             .add_extension(
                 x509.AuthorityKeyIdentifier.from_issuer_public_key(self._key.public_key()),
@@ -159,7 +160,7 @@ class CertificateAuthority:
             )
             .sign(self._key, hashes.SHA256())
         )
-        self._write(key, _pem_of(leaf_key))
+        self._write(key, key_pem(leaf_key))
         self._write(chain, leaf.public_bytes(serialization.Encoding.PEM) + self.pem)
         return ServerCertificate(chain, key, ends, is_new=True)
 
@@ -189,16 +190,16 @@ class CertificateAuthority:
         domains = [x509.DNSName(one) for one in (*_LOCAL_NAMES, *_dns_of(names))]
         self._root = (
             self._builder(name, self._key, self._now + AUTHORITY_LASTS)
-            .issuer_name(_named(name))
+            .issuer_name(common_name(name))
             .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
-            .add_extension(_usage(is_authority=True), critical=True)
+            .add_extension(key_usage(is_authority=True), critical=True)
             .add_extension(
                 x509.NameConstraints(list(dict.fromkeys([*domains, *networks, *own])), None),
                 critical=True,
             )
             .sign(self._key, hashes.SHA256())
         )
-        self._write(self.file.with_suffix(".key"), _pem_of(self._key))
+        self._write(self.file.with_suffix(".key"), key_pem(self._key))
         self._write(self.file, self.pem)
 
     def _builder(
@@ -206,7 +207,7 @@ class CertificateAuthority:
     ) -> x509.CertificateBuilder:
         return (
             x509.CertificateBuilder()
-            .subject_name(_named(name))
+            .subject_name(common_name(name))
             .public_key(key.public_key())
             .serial_number(x509.random_serial_number())
             .not_valid_before(min(self._now, OLDEST) - _BACK)
@@ -230,7 +231,7 @@ class CertificateAuthority:
     def _is_good(self, leaf: x509.Certificate) -> bool:
         if leaf.not_valid_after_utc - self._now < RENEW_BEFORE:
             return False
-        if leaf.issuer != self._root.subject or not _is_signed(leaf, self._root):
+        if leaf.issuer != self._root.subject or not is_signed_by(leaf, self._root):
             return False
         found = leaf.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
         return set(self._names) <= set(found)
@@ -295,31 +296,3 @@ def _certificate(file: Path) -> x509.Certificate | None:
         return x509.load_pem_x509_certificate(file.read_bytes())
     except (OSError, ValueError):
         return None  # a new certificate replaces it
-
-
-def _is_signed(leaf: x509.Certificate, root: x509.Certificate) -> bool:
-    try:
-        leaf.verify_directly_issued_by(root)
-    except Exception:
-        return False
-    return True
-
-
-def _named(name: str) -> x509.Name:
-    return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name[:64])])
-
-
-def _pem_of(key: ec.EllipticCurvePrivateKey) -> bytes:
-    return key.private_bytes(
-        serialization.Encoding.PEM,
-        serialization.PrivateFormat.PKCS8,
-        serialization.NoEncryption(),
-    )
-
-
-def _usage(*, is_authority: bool) -> x509.KeyUsage:
-    return x509.KeyUsage(
-        digital_signature=not is_authority, key_cert_sign=is_authority, crl_sign=is_authority,
-        content_commitment=False, key_encipherment=False, data_encipherment=False,
-        key_agreement=False, encipher_only=False, decipher_only=False,
-    )  # fmt: skip
