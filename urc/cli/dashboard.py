@@ -42,6 +42,7 @@ from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.access import Access
 from urc.web.serve.clock_check import clock_warning
 from urc.web.serve.service_manager import ServiceManager, answers
+from urc.web.sites.site_network import SiteNetwork
 
 __all__ = ["DashboardAddress", "SettingsOf", "robot_options_of", "run_dashboard"]
 
@@ -92,6 +93,8 @@ class DashboardAddress:
     """Hook for alarm notifications; None disables notifications."""
     foxglove: int | None = None
     """Port for Foxglove viewers; None if they use the dashboard's port."""
+    is_in_fleet: bool = False
+    """Whether to join the fleet of the data folder's membership."""
 
 
 def run_dashboard(
@@ -155,6 +158,7 @@ async def _serve(
         await _warn_of(data)
         access = _opened_access(stack, data, place)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
+        network = _network(data) if place.is_in_fleet else None
 
         foxglove = FoxglovePort(place.foxglove) if place.foxglove is not None else None
         manager = ServiceManager()
@@ -184,6 +188,7 @@ async def _serve(
             remake=remake,
             robot_options=robot_options,
             certificates=certificates,
+            network=network,
         )
         app: ASGIApp = build_app(robots, options)
         app = app if foxglove is None else foxglove.around(app)
@@ -197,8 +202,15 @@ async def _serve(
             certificates=certificates,
             allowed_hosts=place.allowed_hosts,
             further=[foxglove] if foxglove is not None else [],
+            door=network.door if network is not None else None,
         )
     return 0
+
+
+def _network(data: Path) -> SiteNetwork:
+    from urc.cli.fleet_network import network_of  # rarely needed
+
+    return network_of(data)
 
 
 def _missing(robot: Robot) -> MissingPackages:

@@ -64,6 +64,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " if this process hangs, robots are not stopped",
     )
     _add_alarms(parser)
+    parser.add_argument(
+        "--fleet",
+        dest="is_in_fleet",
+        action="store_true",
+        help="join the fleet of this data folder: its robots appear here, and these robots there;"
+        " see 'urc fleet'",
+    )
     for flag, text in (
         ("--data-dir", "data folder for latched stops, audit log and settings"),
         (
@@ -134,6 +141,7 @@ def run(arguments: argparse.Namespace) -> int:
             monitors=arguments.monitors,
             notify=_notify(arguments),
             foxglove=arguments.foxglove,
+            is_in_fleet=arguments.is_in_fleet,
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,

@@ -210,6 +210,11 @@ class FleetAuthority:
         """Return the current revocation list; raise `FleetError` if it is missing or damaged."""
         return RevocationList.verified(self.signed_revocations(), self.root)
 
+    @property
+    def revocations_file(self) -> Path:
+        """File of the current revocation list, which `revoke` replaces."""
+        return self.folder / _REVOKED
+
     def signed_revocations(self) -> bytes:
         """Return the current revocation list with its signature, for other sites."""
         return self._file(_REVOKED, MAX_BYTES)

@@ -6,6 +6,7 @@ above the line proves who the peer is, so the names here are claims.
 """
 
 import asyncio
+import logging
 import secrets
 import struct
 from collections.abc import Callable
@@ -26,6 +27,8 @@ _HEAD: Final = struct.Struct(">BQQ")
 """Kind of the message, number of the line, and a position or count in bytes."""
 _OPEN, _DATA, _CONFIRM, _END = range(4)
 _REASON_BYTES: Final = 200
+log = logging.getLogger(__name__)
+
 _Key = tuple[str, Lane, int]
 
 
@@ -284,6 +287,7 @@ class LineTransport(asyncio.Transport):
             self._stall = self._loop.call_later(STALL_S, self._break, reason)
 
     def _break(self, reason: str) -> None:
+        log.warning("a line to the site %s ended: %s", self.site, reason)
         self.tell(_END, 0, reason.encode()[:_REASON_BYTES])
         self._finish(reason)
 

@@ -233,6 +233,13 @@ class Membership:
                 f"{file}: {error}; delete the file, and connect to the fleet"
             ) from error
 
+    def signed_revocations(self) -> bytes:
+        """Return the newest known revocation list with its signature; b"" if there is none."""
+        try:
+            return read(self.folder / _REVOKED, MAX_BYTES)
+        except FileNotFoundError:
+            return b""
+
     def take_revocations(self, signed: bytes) -> bool:
         """Store a signed revocation list if it is newer than the known one; return whether it was.
 

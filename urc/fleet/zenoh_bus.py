@@ -35,6 +35,10 @@ _OPEN_S: Final = 5.0
 _CLOSE_S: Final = 2.0
 _RETRY_MS: Final = 200
 _LONGEST_RETRY_MS: Final = 2000
+_BATCHES: Final = 16
+"""Number of batches of up to 64 KiB that wait for a connection; the library permits no more."""
+_DROP_US: Final = 20_000
+"""Longest wait of a message for a full queue, in microseconds. The event loop waits too."""
 _ALL_MS: Final = -1
 """Zenoh's value for “without end”."""
 
@@ -205,7 +209,8 @@ class ZenohBus(FleetBus):
                 f"{self._root()}/{lane}/{site}/{self.site}",
                 congestion_control=zenoh.CongestionControl.DROP,
                 priority=zenoh.Priority.REAL_TIME if is_control else zenoh.Priority.DATA,
-                express=is_control,
+                # Small messages share a batch while the connection is busy.
+                express=False,
                 allowed_destination=zenoh.Locality.REMOTE,
             )
         return kept
@@ -236,7 +241,16 @@ def session_settings(options: BusOptions, lane: Lane) -> Mapping[str, Any]:
         "period_increase_factor": 2,
     }
     link: dict[str, Any] = {
-        "tx": {"lease": LEASE_MS, "keep_alive": 4},
+        "tx": {
+            "lease": LEASE_MS,
+            "keep_alive": 4,
+            "queue": {
+                # A lost message ends its line. The largest queues of the library bear a sending
+                # thread that gets no processor time; lines bound what waits in them.
+                "size": {"real_time": _BATCHES, "data": _BATCHES},
+                "congestion_control": {"drop": {"wait_before_drop": _DROP_US}},
+            },
+        },
         "rx": {"max_message_size": 4 * MAX_MESSAGE_BYTES},
     }
     if options.root is not None:

@@ -235,6 +235,7 @@ class _Dashboard(Starlette):
                 *gallery.routes(),
                 *files.routes(),
                 *TrustPages(options.certificates).routes(),
+                *(routes.network.routes() if routes.network is not None else ()),
                 *SiteRoutes(lambda: routes.services, routes.contacts.times, __version__).routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
@@ -485,7 +486,7 @@ class _Routes:
         if far is None or self.network is None:
             return None
         try:
-            return await self.network.watch.robot(far)
+            return self.fleet.shown(name, await self.network.watch.robot(far))
         except UrcError as fault:
             raise HTTPException(502, str(fault)) from fault
 

@@ -17,6 +17,7 @@ from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
 from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.serve.access import Access
+from urc.web.serve.site_peer import SitePeer, site_of
 from urc.web.sites.site_network import SiteNetwork, SitePolicy
 
 __all__ = ["Keys", "Place", "keys_of", "message", "place"]
@@ -44,6 +45,10 @@ class Keys:
     def key_pem(self) -> bytes:
         """Return the private key."""
         return Path(self.pair.key).read_bytes()
+
+    def peer(self, certificate_der: bytes) -> SitePeer:
+        """Return the site of a certificate."""
+        return site_of(certificate_der)
 
     def _context(self, kind: int) -> ssl.SSLContext:
         context = ssl.SSLContext(kind)

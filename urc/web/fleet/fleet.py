@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from starlette.requests import Request
 
+from urc.model.profile import Profile
 from urc.runtime.missing_packages import dark_videos
 from urc.runtime.registries import built_in_catalog
 from urc.web.fleet.robots import Robot, RobotService
@@ -56,6 +57,8 @@ class Fleet:
         }
         self.broken: dict[str, BrokenRobot] = {}
         """Unusable robots, keyed by their names in URLs."""
+        self._far: dict[str, tuple[Profile, Robot]] = {}
+        """Robots of other sites with opened pages: the received profile, and the robot."""
         self._dark: dict[str, frozenset[str]] = {}
         self._tasks: dict[str, asyncio.Task[None]] = {}
         self._group: asyncio.TaskGroup | None = None
@@ -77,7 +80,7 @@ class Fleet:
     def add(self, name: str, robot: Robot) -> None:
         """Add a robot; raise `UrcError` if its widgets cannot be served."""
         robot = self._apart(name, robot)
-        self.widgets = _assets({**self.robots, name: robot})
+        self.widgets = self._assets_with(name, robot)
         self.robots[name] = robot
         self.services[name] = self._service(name, robot)
         self._dark.pop(name, None)
@@ -93,7 +96,7 @@ class Fleet:
             UrcError: the widgets of the robot cannot be served.
         """
         robot = self._apart(name, robot)
-        self.widgets = _assets({**self.robots, name: robot})
+        self.widgets = self._assets_with(name, robot)
         self.robots[name] = robot
         self._dark.pop(name, None)
         self.broken.pop(name, None)
@@ -105,11 +108,29 @@ class Fleet:
         self.broken.pop(name, None)
         self._dark.pop(name, None)
         self.services.pop(name, None)
-        self.widgets = _assets(self.robots)
+        self.widgets = self._assets_with()
         task = self._tasks.pop(name, None)
         if task is not None:
             task.cancel()
             await asyncio.wait((task,), timeout=_END_S)
+
+    def shown(self, name: str, far: Robot) -> Robot:
+        """Return a robot of another site for its page, and serve its widgets from now on.
+
+        Raises:
+            UrcError: the widgets of the robot cannot be served.
+        """
+        kept = self._far.get(name)
+        if kept is None or kept[0] is not far.profile:
+            robot = self._apart(name, far)
+            self.widgets = self._assets_with(name, robot)
+            kept = self._far[name] = (far.profile, robot)
+        return replace(kept[1], is_emulated=far.is_emulated)
+
+    def _assets_with(self, name: str = "", robot: Robot | None = None) -> Assets:
+        far = {each: one for each, (_, one) in self._far.items()}
+        more = {} if robot is None else {name: robot}
+        return _assets({**far, **self.robots, **more})
 
     def driven_by(self, name: str) -> str:
         """Return the name of the operator who controls a robot; "" if the robot is at rest.
@@ -150,7 +171,8 @@ class Fleet:
         return not (service.is_used or service.is_heard)
 
     def _apart(self, name: str, robot: Robot) -> Robot:
-        others = [one.profile for other, one in self.robots.items() if other != name]
+        far = {each: one for each, (_, one) in self._far.items()}
+        others = [one.profile for other, one in {**far, **self.robots}.items() if other != name]
         return replace(robot, profile=apart(robot.profile, others))
 
     def _start(self, name: str) -> None:

@@ -19,6 +19,7 @@ class SitePeer(NamedTuple):
     """Serial number of the certificate."""
     key_pem: bytes
     """Public key of the certificate, in PEM format."""
+    certificate_der: bytes
 
 
 def site_of(certificate_der: bytes) -> SitePeer:
@@ -33,4 +34,4 @@ def site_of(certificate_der: bytes) -> SitePeer:
         raise ValueError("the certificate names no site")
     key = certificate.public_key()
     pem = key.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
-    return SitePeer(str(found[0].value), certificate.serial_number, pem)
+    return SitePeer(str(found[0].value), certificate.serial_number, pem, certificate_der)

@@ -204,7 +204,6 @@ def _far(robot: FarRobot) -> Card:
         missing=(),
         missing_names=(),
         initials=_initials(robot.title),
-        address=robot.name.rpartition("@")[2],
         is_live=True,
         is_emulated=robot.emulated,
     )

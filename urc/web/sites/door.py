@@ -5,18 +5,22 @@ browser's connection: requests, sockets, flow control and limits.
 """
 
 import asyncio
+import logging
 import ssl
 from collections.abc import Callable, Mapping
 from typing import Any, Final, cast
 
 from urc.fleet.lines import LineTransport
-from urc.web.serve.site_peer import SitePeer, site_of
+from urc.problems import UrcError
+from urc.web.serve.site_peer import SitePeer
 from urc.web.serve.tls_connection import TlsConnection
 
 __all__ = ["HANDSHAKE_S", "SiteDoor"]
 
 HANDSHAKE_S: Final = 5.0
 """Time limit for the TLS handshake, in seconds."""
+log = logging.getLogger(__name__)
+
 _Make = Callable[[Mapping[str, Any]], asyncio.Protocol]
 
 
@@ -24,16 +28,17 @@ class SiteDoor:
     """Accepts the lines of other sites for one server."""
 
     def __init__(
-        self, context: ssl.SSLContext, may_enter: Callable[[SitePeer], bool] = lambda _: True
+        self, context: Callable[[], ssl.SSLContext], peer: Callable[[bytes], SitePeer]
     ) -> None:
         """Create the door, which refuses all lines until `open`.
 
         Args:
-            context: mutual TLS with the fleet's root certificate.
-            may_enter: function that checks a site's certificate against the revocation list.
+            context: function that returns mutual TLS with the fleet's root certificate.
+            peer: function that returns the site of a certificate in DER that TLS has proven. It
+                raises `UrcError` for a revoked certificate.
         """
         self._context = context
-        self._may_enter = may_enter
+        self._peer = peer
         self._make: _Make | None = None
 
     def open(self, make: _Make) -> None:
@@ -63,17 +68,18 @@ class SiteDoor:
         def step() -> None:
             holder[0].continue_handshake()
 
-        connection = TlsConnection(line, self._context, made, step, lambda: None)
+        connection = TlsConnection(line, self._context(), made, step, lambda: None)
         holder.append(connection)
         return connection
 
     def _admitted(self, line: LineTransport, tls: TlsConnection) -> asyncio.Protocol:
         der = tls.get_extra_info("ssl_object").getpeercert(binary_form=True)
         try:
-            peer = site_of(der or b"")
-        except ValueError:
+            peer = self._peer(der or b"")
+        except UrcError as fault:
+            log.warning("a line of the site %s is refused: %s", line.site, fault)
             return _Refusing()
-        if self._make is None or peer.name != line.site or not self._may_enter(peer):
+        if self._make is None or peer.name != line.site:
             return _Refusing()
         return self._make({"site": peer})
 

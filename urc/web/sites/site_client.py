@@ -53,15 +53,22 @@ class Response(NamedTuple):
 class SiteClient:
     """Opens lines to other sites, with TLS."""
 
-    def __init__(self, lines: Lines, context_of: Callable[[str], ssl.SSLContext]) -> None:
+    def __init__(
+        self,
+        lines: Lines,
+        context_of: Callable[[str], ssl.SSLContext],
+        peer: Callable[[bytes], object],
+    ) -> None:
         """Create a client.
 
         Args:
             lines: the lines of this site.
             context_of: function that returns the TLS context for a site. It checks the fleet's root
                 certificate and the site's name.
+            peer: function that raises `UrcError` for a revoked certificate in DER.
         """
         self._lines = lines
+        self._peer = peer
         self._context_of = context_of
 
     @property
@@ -114,6 +121,12 @@ class SiteClient:
         if not holder[0].is_ready:
             why = holder[0].fault or line.reason or "it ended the connection"
             raise SiteFailed(f"no secure connection to the site {site}: {why}")
+        der = holder[0].get_extra_info("ssl_object").getpeercert(binary_form=True)
+        try:
+            self._peer(der or b"")
+        except UrcError as fault:
+            holder[0].abort()
+            raise SiteFailed(f"no secure connection to the site {site}: {fault}") from fault
         return holder[0]
 
     @asynccontextmanager

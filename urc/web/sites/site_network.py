@@ -22,9 +22,12 @@ from urc.fleet.lines import Lines
 from urc.model.role import ROLES, Role
 from urc.problems import UrcError
 from urc.web.serve.access import Access
+from urc.web.serve.rights import ProtectedRoute
 from urc.web.serve.site_peer import SitePeer
 from urc.web.sites.door import SiteDoor
 from urc.web.sites.gateway import Gateway
+from urc.web.sites.member import Member
+from urc.web.sites.member_routes import MemberRoutes
 from urc.web.sites.site_client import SiteClient
 from urc.web.sites.site_watch import SiteWatch
 
@@ -50,6 +53,9 @@ class SiteKeys(Protocol):
 
     def key_pem(self) -> bytes:
         """Return the private key of the certificate."""
+
+    def peer(self, certificate_der: bytes) -> SitePeer:
+        """Return the site of a certificate that TLS has proven; raise `UrcError` if revoked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +83,7 @@ class SiteNetwork:
         bus: FleetBus,
         *,
         policy: SitePolicy = SitePolicy(),
-        may_enter: Callable[[SitePeer], bool] = lambda _: True,
+        member: Member | None = None,
         utc: Callable[[], float] = time.time,
     ) -> None:
         """Prepare the network.
@@ -86,18 +92,24 @@ class SiteNetwork:
             keys: the membership of this site.
             bus: the network of the fleet.
             policy: rights of visitors from other sites.
-            may_enter: function that checks a site's certificate against the revocation list.
+            member: the membership, for renewals and revocations; None for fixed certificates.
             utc: UTC time in seconds since 1970.
         """
         self._keys = keys
         self._bus = bus
         self._policy = policy
         self._utc = utc
-        self.door = SiteDoor(keys.server_context(), may_enter)
+        self.member = member
+        self.door = SiteDoor(keys.server_context, keys.peer)
         self._lines = Lines(bus, self.door.accept)
-        self.client = SiteClient(self._lines, keys.client_context)
+        self.client = SiteClient(self._lines, keys.client_context, keys.peer)
         self.watch = SiteWatch(self.client, keys.folder)
-        self._lines.on_sites = lambda _: self.watch.changed()
+        self._lines.on_sites = self._sites_changed
+        self._present: frozenset[str] = frozenset()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._access: Access | None = None
+        if member is not None:
+            member.on_revoked = self._revoked
 
     @property
     def site(self) -> str:
@@ -134,16 +146,41 @@ class SiteNetwork:
 
     def around(self, app: ASGIApp, access: Access) -> ASGIApp:
         """Return the application with robots of other sites."""
+        self._access = access
         return Gateway(app, self.client, self, access.followed)
+
+    def routes(self) -> list[ProtectedRoute]:
+        """Return the routes about certificates for other sites."""
+        return MemberRoutes(self.member).routes() if self.member is not None else []
+
+    def _sites_changed(self, sites: frozenset[str]) -> None:
+        self.watch.changed()
+        new, self._present = sites - self._present, sites
+        if self.member is None:
+            return
+        for site in new:
+            task = asyncio.create_task(self.member.exchange(self.client, site))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    def _revoked(self, sites: frozenset[str]) -> None:
+        """End all that sites with revoked certificates have open; valid ones connect again."""
+        for site in sites:
+            self._lines.end_with(site)
+            if self._access is not None:
+                self._access.control.end_visits(site)
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Take part in the fleet while the context is open; raise `BusFailed` if impossible."""
         await self._bus.open()
-        watching = asyncio.create_task(self.watch.run())
+        tasks = [asyncio.create_task(self.watch.run())]
+        if self.member is not None:
+            tasks.append(asyncio.create_task(self.member.keep(self.client)))
         try:
             yield
         finally:
-            watching.cancel()
+            for task in (*tasks, *self._tasks):
+                task.cancel()
             self._lines.close()
             await self._bus.close()
