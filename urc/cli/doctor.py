@@ -4,6 +4,7 @@ import argparse
 import platform
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
@@ -36,14 +37,14 @@ EXTRAS = {
     "pillow": ("images", "raw images of ROS, and cameras of emulated robots"),
     "serialx": ("serial", "robots on serial ports"),
     "paho-mqtt": ("mqtt", "robots behind an MQTT broker"),
-    "eclipse-zenoh": ("zenoh", "devices with Zenoh keys, and ROS 2 over Zenoh"),
+    "eclipse-zenoh": ("zenoh", "devices with Zenoh keys, ROS 2 over Zenoh, and fleets"),
     "xxhash": ("zenoh", "ROS 2 over Zenoh"),
     "cbor2": ("cbor", "CBOR images from rosbridge"),
     "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
     "mcap": ("record", "recordings of sessions"),
     "av": ("video", "cameras that send H.264 or H.265"),
     "aiortc": ("whep", "cameras behind a WebRTC server, with WHEP"),
-    "joserfc": ("oidc", "sign-in with an OpenID Connect provider"),
+    "joserfc": ("oidc", "sign-in with an OpenID Connect provider, and fleets"),
 }
 """Extra and purpose of each optional package, by package name."""
 OPTIONAL = {
@@ -116,6 +117,7 @@ def _problems(port: int, data: Path) -> Iterator[_Finding]:
     yield _priority()
     yield _clock(data)
     yield _attempt("authority", lambda: _authority(data), is_required=False)
+    yield from _fleet(data)
     yield _attempt("port", lambda: _try_port(port), is_required=False)
 
 
@@ -166,6 +168,23 @@ def _authority(data: Path) -> str:
         reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
         raise UrcError(f"{file} cannot be used: {reason}") from error
     return f"{fingerprint(root)}, until {root.not_valid_after_utc:%Y-%m-%d}"
+
+
+def _fleet(data: Path) -> Iterator[_Finding]:
+    from urc.fleet.faults import membership_faults
+    from urc.fleet.files import FLEET_FOLDER
+    from urc.fleet.membership import Membership, NoMembership
+
+    faults = list(membership_faults(data / FLEET_FOLDER, datetime.now(UTC)))
+    yield from (_Finding("fleet", False, fault) for fault in faults)
+    if not faults:
+        try:
+            own = Membership.load(data / FLEET_FOLDER)
+        except NoMembership:
+            yield _Finding("fleet", True, "this server is in no fleet")
+            return
+        ends = f"{own.certificate.ends:%Y-%m-%d %H:%M} UTC"
+        yield _Finding("fleet", True, f"site {own.site} of fleet {own.fleet}, until {ends}")
 
 
 def _load_robots() -> str:

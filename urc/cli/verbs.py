@@ -34,6 +34,7 @@ VERBS: dict[str, str] = {
     "devices": "pair phones, tablets and computers, and manage them",
     "tokens": "manage the tokens of programs",
     "sign-ins": "list and end the sign-ins of browsers, devices and programs",
+    "fleet": "make a fleet of several servers, invite sites and revoke them",
     "backup": "save people, keys, settings and logs to one file",
     "restore": "restore a backup of people, keys, settings and logs",
     "discover": "find serial ports, ROS topics, and robots on the network",
@@ -49,7 +50,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     ),
     "packages": (*("search", "install", "update", "list", "remove", "bundle", "publish", "repo"),),
     "people and rights": ("people", "devices", "tokens", "sign-ins", "audit"),
-    "this machine": ("doctor", "backup", "restore", "completion"),
+    "this machine": ("doctor", "fleet", "backup", "restore", "completion"),
 }
 """Headings of the help text, each with its subcommands."""
 

@@ -4,7 +4,7 @@ Layer 4.
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Final
 
@@ -38,9 +38,8 @@ def read(file: Path, at_most: int = 1 << 16) -> bytes:
     except FileNotFoundError:
         raise
     except OSError as error:
-        raise FleetError(
-            f"{file}: cannot be read: {error.strerror}; run URC as the owner of the folder"
-        ) from error
+        hint = "; run URC as the owner of the folder" if isinstance(error, PermissionError) else ""
+        raise FleetError(f"{file}: cannot be read: {error.strerror}{hint}") from error
     if len(data) > at_most:
         raise FleetError(f"{file}: expected at most {at_most} bytes")
     return data
@@ -61,12 +60,12 @@ def locked(folder: Path) -> Iterator[None]:
     Raises:
         FleetError: the folder is unusable, or another process has used it for 10 seconds.
     """
-    try:
-        with exclusive(folder / "lock"):
-            yield
-    except PackageError as error:
-        raise FleetError(f"{folder}: another URC process is using the folder; try again") from error
-    except PermissionError as error:
-        raise FleetError(
-            f"{folder}: cannot be used: {error.strerror}; run URC as the owner of the folder"
-        ) from error
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(exclusive(folder / "lock"))
+        except PackageError as error:
+            text = f"{folder}: another URC process is using the folder; try again"
+            raise FleetError(text) from error
+        except OSError as error:
+            raise FleetError(f"{folder}: cannot be written: {error.strerror}") from error
+        yield

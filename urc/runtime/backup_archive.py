@@ -36,6 +36,7 @@ __all__ = [
 PARTS: Final = re.compile(
     r"(?:access\.sqlite|alarms\.sqlite|audit\.sqlite|known_hosts|publisher\.pem"
     r"|contact-times\.json"
+    r"|fleet/(?:authority/)?\w[\w-]{0,100}\.(?:pem|key|json)"
     r"|tls/\w[\w.-]{0,100}|robots/[\w%~-][\w.%~-]{0,250}\.json"
     r"|latches/(?:emulated/)?\w[\w.-]{0,100}\.latch\.json"
     r"|packages/(?:state|blocks)\.json|packages/blobs/[0-9a-f]{64}\.zip"
@@ -45,7 +46,7 @@ PARTS: Final = re.compile(
 """Paths of the files in a backup, relative to the data folder."""
 LEFT_OUT: Final = re.compile(
     r"(?:servers|packages/(?:ecosystems|work|blocking-work)|restoring-\w+|replaced-\w+)/.*"
-    r"|packages/(?:changing|blocking|repositories/changing)"
+    r"|fleet/(?:authority/)?lock|packages/(?:changing|blocking|repositories/changing)"
     r"|simulator_host_key|audit-before-\w+\.sqlite|.*\.(?:new|broken)|.*\.sqlite-(?:wal|shm|journal)",
     re.ASCII,
 )

@@ -59,6 +59,9 @@ def data(tmp_path: Path) -> Path:
         "publisher.pem": "a key",
         "tls/authority.pem": "a certificate",
         "tls/authority.key": "its key",
+        "fleet/fleet.json": "{}",
+        "fleet/site.key": "a key",
+        "fleet/authority/root.key": "a key",
         "robots/cart%20one.json": "{}",
         "latches/cart.latch.json": latch("Ann"),
         "latches/emulated/cart.latch.json": latch(""),
@@ -69,6 +72,8 @@ def data(tmp_path: Path) -> Path:
         "servers/1a2b3c4d.json": "{}",
         "packages/ecosystems/x/robot.yaml": "",
         "packages/changing": "",
+        "fleet/lock": "",
+        "fleet/authority/lock": "",
         "latches/.cart.latch.json.ab12.new": "",
     }
     for path, text in (kept | left_out).items():
@@ -116,15 +121,15 @@ def test_a_backup_has_all_lasting_files_with_their_modes(data: Path, tmp_path: P
         assert [one.path for one in reader.files] == written
     target = tmp_path / "new" / "data"
     restored(file, target)
-    assert len(content(target)) == 9
+    assert len(content(target)) == 12
     assert content(target) == content(data)
     assert word_in(target / "access.sqlite") == "people"
     assert word_in(target / "audit.sqlite") == "entries"
     modes = {stat.S_IMODE(one.stat().st_mode) for one in (target, target / "tls")}
     assert modes == {0o700}
     assert sorted(one.name for one in target.iterdir()) == [
-        "access.sqlite", "audit.sqlite", "known_hosts", "latches", "packages", "publisher.pem",
-        "robots", "tls",
+        "access.sqlite", "audit.sqlite", "fleet", "known_hosts", "latches", "packages",
+        "publisher.pem", "robots", "tls",
     ]  # fmt: skip
 
 
