@@ -158,7 +158,6 @@ async def _serve(
         await _warn_of(data)
         access = _opened_access(stack, data, place)
         certificates = await certificates_of(place.tls, place.host, place.allowed_hosts, data)
-        network = _network(data) if place.is_in_fleet else None
 
         foxglove = FoxglovePort(place.foxglove) if place.foxglove is not None else None
         manager = ServiceManager()
@@ -181,19 +180,17 @@ async def _serve(
             await stack.enter_async_context(_listening(faulty))
         remake = {name: partial(factory.robot, name) for name in robots} if is_dev else None
         options = replace(
-            _options(place),
+            _options(place, data),
             access=access,
             data=data,
             audit=audit,
             remake=remake,
             robot_options=robot_options,
             certificates=certificates,
-            network=network,
         )
         app: ASGIApp = build_app(robots, options)
         app = app if foxglove is None else foxglove.around(app)
-        gc.collect()
-        gc.freeze()  # exclude loaded objects from later garbage collections, to avoid delays
+        _freeze_loaded_objects()
         await serve(
             place.tls.around(app),
             host=place.host,
@@ -202,9 +199,15 @@ async def _serve(
             certificates=certificates,
             allowed_hosts=place.allowed_hosts,
             further=[foxglove] if foxglove is not None else [],
-            door=network.door if network is not None else None,
+            door=options.network.door if options.network is not None else None,
         )
     return 0
+
+
+def _freeze_loaded_objects() -> None:
+    """Exclude loaded objects from later garbage collections, to avoid delays."""
+    gc.collect()
+    gc.freeze()
 
 
 def _network(data: Path) -> SiteNetwork:
@@ -243,7 +246,7 @@ def _audited(stack: AsyncExitStack, place: DashboardAddress) -> tuple[AuditLog, 
     return audit, replace(place, recorder=ServerRecorder(audit.add))
 
 
-def _options(place: DashboardAddress) -> DashboardOptions:
+def _options(place: DashboardAddress, data: Path) -> DashboardOptions:
     """Return the dashboard's options that the command line determines."""
     return DashboardOptions(
         allowed_hosts=(*place.allowed_hosts, *place.tls.hosts()),
@@ -252,6 +255,7 @@ def _options(place: DashboardAddress) -> DashboardOptions:
         recordings=place.recordings,
         sign_in=place.sign_in,
         notifier=AlarmNotifier(place.notify) if place.notify is not None else None,
+        network=_network(data) if place.is_in_fleet else None,
     )
 
 

@@ -182,7 +182,9 @@ class LineTransport(asyncio.Transport):
     # Called by the protocol
 
     def get_extra_info(self, name: str, default: Any = None) -> Any:
-        """Return ``peername``, which is the name of the other site and port 0."""
+        """Return ``peername``, the name of the other site and port 0, or ``line``, this line."""
+        if name == "line":
+            return self
         return (self.site, 0) if name == "peername" else default
 
     def get_protocol(self) -> asyncio.BaseProtocol:
@@ -234,8 +236,12 @@ class LineTransport(asyncio.Transport):
 
     def abort(self) -> None:
         """End the line immediately."""
+        self.refuse("the other site ended the line")
+
+    def refuse(self, reason: str) -> None:
+        """End the line immediately; the other site learns the reason, in one line."""
         if not self._is_over:
-            self.tell(_END, 0, b"the other site ended the line")
+            self.tell(_END, 0, reason.encode()[:_REASON_BYTES])
             self._finish("")
 
     # Inside

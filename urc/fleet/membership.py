@@ -234,7 +234,7 @@ class Membership:
             ) from error
 
     def signed_revocations(self) -> bytes:
-        """Return the newest known revocation list with its signature; b"" if there is none."""
+        """Return the newest known revocation list with its signature, or b""."""
         try:
             return read(self.folder / _REVOKED, MAX_BYTES)
         except FileNotFoundError:

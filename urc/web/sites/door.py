@@ -78,8 +78,10 @@ class SiteDoor:
             peer = self._peer(der or b"")
         except UrcError as fault:
             log.warning("a line of the site %s is refused: %s", line.site, fault)
+            line.refuse(str(fault))
             return _Refusing()
         if self._make is None or peer.name != line.site:
+            line.refuse(f"the certificate is not for the site {line.site}")
             return _Refusing()
         return self._make({"site": peer})
 

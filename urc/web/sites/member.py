@@ -115,7 +115,7 @@ class Member:
         return self._authority.renew(csr_pem, old, self._utc())
 
     def signed_revocations(self) -> bytes:
-        """Return the newest known list as signed by the authority; b"" if there is none."""
+        """Return the newest known list as signed by the authority, or b""."""
         if self._authority is not None:
             return self._authority.signed_revocations()
         return self._membership.signed_revocations()
@@ -126,9 +126,13 @@ class Member:
         Raises:
             FleetError: the list is not from this fleet's authority.
         """
-        if not self._membership.take_revocations(signed):
+        if self._authority is not None:  # after the restore of a backup, sites know more
+            self._authority.merge_revocations(signed)
+        self._membership.take_revocations(signed)
+        newest = self._membership.revocations()  # another process may have stored it already
+        if newest.number <= self._revoked.number:
             return False
-        self._revoked = self._membership.revocations()
+        self._revoked = newest
         self.on_revoked(frozenset(self._revoked.serials))
         return True
 

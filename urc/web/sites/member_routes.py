@@ -44,7 +44,7 @@ class MemberRoutes:
 
     @answers_errors
     async def revocations(self, _: Request) -> Response:
-        """Return the newest known revocation list; empty if there is none."""
+        """Return the newest known revocation list, or an empty response."""
         signed = await asyncio.to_thread(self._member.signed_revocations)
         return Response(signed, media_type=_BYTES)
 

@@ -160,6 +160,8 @@ class SiteClient:
                 raise SiteFailed(f"the site {site} sent no response")
             yield Response(head.status_code, list(head.headers), _parts(talk, reader, site))
         except (h11.RemoteProtocolError, h11.LocalProtocolError) as fault:
+            if reason := tls.get_extra_info("line").reason:
+                raise SiteFailed(f"the site {site} refuses the connection: {reason}") from fault
             raise SiteFailed(f"the site {site} sent an invalid response ({fault})") from fault
         finally:
             tls.abort()
@@ -190,7 +192,7 @@ async def _next(talk: h11.Connection, reader: asyncio.StreamReader, site: str) -
         except TimeoutError:
             raise SiteFailed(f"the site {site} has not answered for {ANSWER_S:g} s") from None
         except ConnectionError as fault:
-            raise SiteFailed(f"the connection to the site {site} ended ({fault})") from fault
+            raise SiteFailed(f"the site {site} refuses the connection: {fault}") from fault
 
 
 class _Side(asyncio.Protocol):
