@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -12,9 +13,11 @@ import pytest
 import zxingcpp
 
 from tests.e2e.command_line import run
+from tests.unit.fleet.fleets import Place
 from urc.fleet.authority import FleetAuthority
 from urc.fleet.certificates import CertificateRefused
 from urc.fleet.files import AUTHORITY_FOLDER, FLEET_FOLDER
+from urc.fleet.invitation import SiteInvitation
 from urc.fleet.membership import Membership
 
 ADDRESS = "192.168.1.20:7447"
@@ -156,9 +159,20 @@ def test_a_code_that_was_used_is_refused_at_the_second_site(
     assert hall.status()["is_invitation"] is False
 
 
-def test_an_expired_code_is_refused_and_nothing_is_made(office: Site, hall: Site) -> None:
+def test_commands_at_the_same_time_lose_no_certificate(office: Site) -> None:
+    """Each invitation is in the ledger, so each can be revoked."""
+    sites = [f"hall-{number}" for number in range(6)]
+    with ThreadPoolExecutor(len(sites)) as pool:
+        codes = list(pool.map(lambda one: office("invite", one, "--address", ADDRESS), sites))
+        said = list(pool.map(lambda one: office("revoke", one), sites))
+    assert sorted(line.split()[-1] for line in said) == [f"{number})" for number in range(1, 7)]
+    revoked = authority_of(office).revocations()
+    assert all(revoked.revokes(SiteInvitation.parse(one).certificate.serial) for one in codes)
+
+
+def test_an_expired_code_is_refused_and_nothing_is_made(hall: Site, tmp_path: Path) -> None:
     past = datetime.now(UTC) - timedelta(hours=30)
-    code = authority_of(office).invite("hall", [ADDRESS], past).code()
+    code = Place(tmp_path, now=past).invite(now=past).code()
     assert "the invitation of site hall ended 6 hours ago" in hall.refused("join", code)
     assert not hall.folder.exists()
 

@@ -174,7 +174,7 @@ def _status(data: Path, arguments: argparse.Namespace) -> int:
     words_of(arguments, "fleet")
     folder = data / FLEET_FOLDER
     own = Membership.load(folder)
-    faults = list(membership_faults(folder, _now()))
+    faults = list(membership_faults(folder, datetime.now(UTC)))
     listen, connect = [*map(address_of, own.listen)], [*map(address_of, own.connect)]
     revoked = own.revocations()
     row = {
@@ -248,7 +248,13 @@ def _print_qr(code: str) -> None:
 
 
 def _now() -> datetime:
-    return datetime.now(UTC)
+    """Return the time; raise `UrcError` if the clock is certainly wrong."""
+    from urc.access.wrong_clock import clock_fault
+
+    now = datetime.now(UTC)
+    if fault := clock_fault(now.timestamp()):
+        raise UrcError(fault)
+    return now
 
 
 _ACTIONS: dict[str, _Action] = {

@@ -123,6 +123,11 @@ class FleetRoot:
         return cls(made, fleet)
 
     @property
+    def ends(self) -> datetime:
+        """Last valid time of the root certificate, and of all certificates that it issues."""
+        return self.certificate.not_valid_after_utc
+
+    @property
     def pem(self) -> bytes:
         """The root certificate in PEM."""
         return certificate_pem(self.certificate)
@@ -139,7 +144,17 @@ class FleetRoot:
         """Return a new certificate of a site, signed with the root's `key`.
 
         The certificate is valid for `SITE_LASTS`, or for `INVITATION_LASTS` in an invitation.
+
+        Raises:
+            FleetError: the clock shows a time before the root certificate, or after its end.
         """
+        starts = self.certificate.not_valid_before_utc
+        if not starts <= now < self.ends:
+            raise FleetError(
+                f"the clock of this computer shows {now:%Y-%m-%d %H:%M} UTC, but fleet {self.fleet}"
+                f" lasts from {starts:%Y-%m-%d} to {self.ends:%Y-%m-%d}; set the clock, or make a"
+                " new fleet"
+            )
         subject = common_name(site)
         if is_invitation:
             unit = x509.NameAttribute(NameOID.ORGANIZATIONAL_UNIT_NAME, _INVITATION)
@@ -147,7 +162,7 @@ class FleetRoot:
         uses = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
         lasts = INVITATION_LASTS if is_invitation else SITE_LASTS
         made = (
-            _builder(subject, public_key, now, lasts)
+            _builder(subject, public_key, now, min(lasts, self.ends - now))
             .issuer_name(self.certificate.subject)
             .add_extension(x509.SubjectAlternativeName([x509.DNSName(site)]), critical=False)
             .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
@@ -176,6 +191,11 @@ class FleetRoot:
             raise CertificateRefused(
                 f"the {what} of site {certificate.site} is not valid yet: the clock of this"
                 f" computer is at least {duration(certificate.starts - now)} behind; set the clock"
+            )
+        if now > self.ends:
+            raise CertificateRefused(
+                f"the root certificate of fleet {self.fleet} ended {duration(now - self.ends)} ago,"
+                " or the clock of this computer is ahead; make a new fleet"
             )
         if now > certificate.ends:
             raise CertificateRefused(

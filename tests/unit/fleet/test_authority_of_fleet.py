@@ -13,6 +13,7 @@ from urc._x509 import common_name
 from urc.fleet.authority import FleetAuthority
 from urc.fleet.certificates import (
     INVITATION_LASTS,
+    ROOT_LASTS,
     SITE_LASTS,
     CertificateRefused,
     SiteCertificate,
@@ -215,6 +216,18 @@ def test_the_own_site_of_the_authority_renews_even_after_its_end(tmp_path: Path)
     assert renew_own(place.authority, place.office, NOW + HOUR) is place.office
     late = NOW + 3 * SITE_LASTS
     assert renew_own(place.authority, place.office, late).certificate.ends == late + SITE_LASTS
+
+
+def test_no_certificate_is_issued_outside_the_time_of_the_root(tmp_path: Path) -> None:
+    """A certificate of a wrong clock would be refused elsewhere, with a confusing reason."""
+    place = Place(tmp_path)
+    last = NOW + ROOT_LASTS - HOUR
+    assert place.invite("late", last).certificate.ends == NOW + ROOT_LASTS
+    for wrong in (NOW - HOUR, NOW + ROOT_LASTS):
+        with pytest.raises(FleetError, match=r"lasts from 2026-12-01 to 2036-11-28; set the clock"):
+            place.invite("hall", wrong)
+    with pytest.raises(CertificateRefused, match="the root certificate of fleet mill ended 2 hou"):
+        place.office.check(NOW + ROOT_LASTS + 2 * HOUR)
 
 
 def test_an_authority_is_never_replaced(tmp_path: Path) -> None:
