@@ -231,6 +231,20 @@ def test_wrong_use_is_named(office: Site) -> None:
     assert "fleet mill has no site hell; known sites: none" in office.refused("revoke", "hell")
 
 
+def test_the_authority_renews_its_own_certificate_after_a_long_time_off(tmp_path: Path) -> None:
+    past = datetime.now(UTC) - timedelta(days=40)
+    office = Site(tmp_path / "data")
+    office.data.mkdir()
+    Place(tmp_path, now=past).office.folder.rename(office.folder)
+    assert "ended 33 days ago, or the clock of this computer is ahead; run 'urc fleet renew'" in (
+        office.doctor()
+    )
+    said = office("renew")
+    assert said.startswith("the certificate of site office ends: ")
+    assert office("renew") == said  # not due yet, so it stays
+    assert office.status()["problems"] == []
+
+
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
 def test_openssl_accepts_the_files_of_each_site(office: Site, hall: Site) -> None:
     hall("join", office("invite", "hall", "--address", ADDRESS).strip())

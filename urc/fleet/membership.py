@@ -152,19 +152,28 @@ class Membership:
         """Check that this site's certificate is valid now; raise `CertificateRefused` if not."""
         self._check(self.certificate, now)
 
-    def peer(self, certificate: bytes, now: datetime) -> SiteCertificate:
+    def peer(
+        self, certificate: bytes, now: datetime, *, is_renewal: bool = False
+    ) -> SiteCertificate:
         """Return the certificate of another site, after a TLS handshake has proven its key.
 
         Args:
             certificate: the certificate in DER or PEM.
             now: time with a time zone.
+            is_renewal: whether the site only renews its certificate, for which the certificate of
+                an invitation is good enough.
 
         Raises:
-            CertificateRefused: the certificate is from another fleet, not valid now, or revoked.
+            CertificateRefused: the certificate is from another fleet, not valid now, revoked, or
+                from an invitation.
             FleetError: the data is not the certificate of a site.
         """
         found = SiteCertificate.parse(certificate)
         self._check(found, now)
+        if found.is_invitation and not is_renewal:
+            raise CertificateRefused(
+                f"site {found.site} must first renew the certificate of its invitation"
+            )
         return found
 
     def server_context(self) -> ssl.SSLContext:

@@ -1,5 +1,6 @@
 """What `urc doctor` says about a membership: each problem in one line, with a hint."""
 
+import os
 from datetime import datetime, timedelta
 from importlib import util
 from pathlib import Path
@@ -78,12 +79,17 @@ def test_a_key_that_does_not_match(tmp_path: Path) -> None:
 
 
 def test_an_unreadable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even the existence of a file can be read there."""
     hall = Place(tmp_path).member()
+    stat = os.stat
 
-    def refused(file: Path, *arguments: object) -> None:
-        raise PermissionError(13, "Permission denied", str(file))
+    def refused(file: str | Path, *arguments: object, **options: object) -> object:
+        if Path(file).is_relative_to(hall.folder):
+            raise PermissionError(13, "Permission denied", str(file))
+        return stat(file, *arguments, **options)  # type: ignore[call-overload]
 
     monkeypatch.setattr(Path, "open", refused)
+    monkeypatch.setattr(os, "stat", refused)
     assert said(hall) == (
         f"{hall.folder / 'fleet.json'}: cannot be read: Permission denied; run URC as the owner of"
         " the folder"

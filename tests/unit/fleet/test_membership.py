@@ -125,6 +125,16 @@ def test_the_certificate_of_a_peer_is_checked_in_full(tmp_path: Path) -> None:
         place.office.peer(hall.certificate.pem, NOW)
 
 
+def test_the_certificate_of_an_invitation_is_good_for_its_renewal_only(tmp_path: Path) -> None:
+    """A copied code must not read a robot, even before the invited site has used it."""
+    place = Place(tmp_path)
+    invited = place.joined()
+    with pytest.raises(CertificateRefused, match="site hall must first renew the certificate of"):
+        place.office.peer(invited.certificate.pem, NOW)
+    found = place.office.peer(invited.certificate.pem, NOW, is_renewal=True)
+    assert place.authority.renew(invited.renewal(), found, NOW)
+
+
 def test_a_site_does_not_leave_its_fleet_by_mistake(tmp_path: Path) -> None:
     place, other = Place(tmp_path / "a"), Place(tmp_path / "b", "other")
     hall = place.member()
