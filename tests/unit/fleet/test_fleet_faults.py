@@ -4,6 +4,7 @@ import os
 from datetime import datetime, timedelta
 from importlib import util
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,10 +84,10 @@ def test_an_unreadable_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     hall = Place(tmp_path).member()
     stat = os.stat
 
-    def refused(file: str | Path, *arguments: object, **options: object) -> object:
+    def refused(file: str | Path, *arguments: Any, **options: Any) -> os.stat_result:
         if Path(file).is_relative_to(hall.folder):
             raise PermissionError(13, "Permission denied", str(file))
-        return stat(file, *arguments, **options)  # type: ignore[call-overload]
+        return stat(file, *arguments, **options)
 
     monkeypatch.setattr(Path, "open", refused)
     monkeypatch.setattr(os, "stat", refused)

@@ -221,7 +221,20 @@ def test_a_damaged_revocation_list_is_named_and_replaced_by_the_next_one(tmp_pat
     place = Place(tmp_path)
     hall = place.member()
     hall.take_revocations(place.authority.signed_revocations())
-    (hall.folder / "revoked.json").write_text("{}")
-    with pytest.raises(FleetError, match=r"revoked\.json: the revocation list is damaged; delete"):
-        hall.revocations()
+    for text in ("{}", ""):
+        (hall.folder / "revoked.json").write_text(text)
+        with pytest.raises(FleetError, match=r"revoked\.json: the revocation list is damaged; del"):
+            hall.revocations()
     assert hall.take_revocations(place.authority.signed_revocations())
+
+
+def test_a_revocation_passes_from_site_to_site(tmp_path: Path) -> None:
+    """The authority need not be reachable."""
+    place = Place(tmp_path)
+    hall, store = place.member(), place.member("store")
+    assert store.signed_revocations() == b""
+    place.authority.revoke("hall", NOW)
+    place.office.take_revocations(place.authority.signed_revocations())
+    assert store.take_revocations(place.office.signed_revocations())
+    with pytest.raises(CertificateRefused, match="site hall is revoked"):
+        store.peer(hall.certificate.pem, NOW)
