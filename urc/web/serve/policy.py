@@ -215,6 +215,7 @@ class Policy:
         refused = ""
         if (peer := state.get("site")) is not None:
             state["visitor"], refused = self._access.visitor_from(peer, scope["headers"])
+            refused = peer.refusal(scope["path"]) or refused
         else:
             state["visitor"] = self._access.visitor(
                 scope["headers"], is_secure=scope["scheme"] in ("https", "wss")

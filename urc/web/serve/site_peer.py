@@ -3,12 +3,15 @@
 Layer 5. Pure.
 """
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
 
-__all__ = ["SitePeer", "site_of"]
+__all__ = ["CERTIFICATE", "SitePeer", "site_of"]
+
+CERTIFICATE: Final = "/fleet/certificate"
+"""Path at which a site renews its certificate."""
 
 
 class SitePeer(NamedTuple):
@@ -20,6 +23,14 @@ class SitePeer(NamedTuple):
     key_pem: bytes
     """Public key of the certificate, in PEM format."""
     certificate_der: bytes
+    is_invitation: bool = False
+    """Whether the certificate is from an invitation: good for its renewal only."""
+
+    def refusal(self, path: str) -> str:
+        """Return why the site may not send a request to a path; "" if it may."""
+        if self.is_invitation and path != CERTIFICATE:
+            return f"site {self.name} must first renew the certificate of its invitation"
+        return ""
 
 
 def site_of(certificate_der: bytes) -> SitePeer:

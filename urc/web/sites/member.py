@@ -8,6 +8,7 @@ import asyncio
 import logging
 import ssl
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
@@ -19,12 +20,11 @@ from urc.fleet.files import AUTHORITY_FOLDER
 from urc.fleet.joining import renew_own
 from urc.fleet.membership import Membership
 from urc.fleet.names import FleetError
-from urc.web.serve.site_peer import SitePeer, site_of
+from urc.web.serve.site_peer import CERTIFICATE, SitePeer, site_of
 from urc.web.sites.site_client import SiteClient, SiteFailed
 
-__all__ = ["CERTIFICATE", "REVOCATIONS", "Member"]
+__all__ = ["REVOCATIONS", "Member"]
 
-CERTIFICATE: Final = "/fleet/certificate"
 REVOCATIONS: Final = "/fleet/revocations"
 _LOOK_S: Final = 0.1
 """Interval between checks of the authority's revocation list, in seconds."""
@@ -52,6 +52,7 @@ class Member:
         self._server: tuple[int, ssl.SSLContext] | None = None
         self._clients: dict[tuple[str, int], ssl.SSLContext] = {}
         self._revoked = membership.revocations()
+        self._news = asyncio.Event()
         self.on_revoked: Callable[[frozenset[str]], None] = _ignore
         """Callback with the sites of a new revocation list."""
 
@@ -100,7 +101,7 @@ class Member:
         self._membership.root.check(found, self._utc())
         if self._revoked.revokes(found.serial):
             raise FleetError(f"the certificate of site {found.site} is revoked")
-        return site_of(certificate_der)
+        return site_of(certificate_der)._replace(is_invitation=found.is_invitation)
 
     def renewed_for(self, csr_pem: bytes, peer: SitePeer) -> bytes:
         """Return a new certificate for another site, in PEM, with its chain.
@@ -143,6 +144,10 @@ class Member:
             if self._authority is not None:
                 group.create_task(self._spread(client, self._authority))
 
+    def sites_changed(self) -> None:
+        """Try a due renewal again, because the authority's site may have appeared."""
+        self._news.set()
+
     async def exchange(self, client: SiteClient, site: str) -> None:
         """Compare revocation lists with a site that has appeared; the newer list wins at both."""
         try:
@@ -184,8 +189,11 @@ class Member:
                 try:
                     await self._renew(client)
                 except (SiteFailed, FleetError) as fault:
-                    log.warning("the certificate of this site was not renewed: %s", fault)
-            await asyncio.sleep(_RENEW_S)
+                    log.info("the certificate of this site was not renewed: %s", fault)
+            self._news.clear()
+            with suppress(TimeoutError):
+                async with asyncio.timeout(_RENEW_S):
+                    await self._news.wait()
 
     async def _renew(self, client: SiteClient) -> None:
         now = self._utc()

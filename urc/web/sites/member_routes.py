@@ -11,7 +11,8 @@ from starlette.responses import Response
 from urc.fleet.names import FleetError
 from urc.web.serve.replies import ApiError, answer, answers_errors
 from urc.web.serve.rights import SITE, ProtectedRoute
-from urc.web.sites.member import CERTIFICATE, REVOCATIONS, Member
+from urc.web.serve.site_peer import CERTIFICATE
+from urc.web.sites.member import REVOCATIONS, Member
 
 __all__ = ["MemberRoutes"]
 

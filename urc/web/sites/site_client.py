@@ -15,6 +15,7 @@ import h11
 from urc.fleet.bus import Lane
 from urc.fleet.lines import Lines, SiteAbsent
 from urc.problems import UrcError
+from urc.web.serve.site_peer import SitePeer
 from urc.web.serve.tls_connection import TlsConnection
 
 __all__ = ["Response", "SiteClient", "SiteFailed", "relayed"]
@@ -57,7 +58,7 @@ class SiteClient:
         self,
         lines: Lines,
         context_of: Callable[[str], ssl.SSLContext],
-        peer: Callable[[bytes], object],
+        peer: Callable[[bytes], SitePeer],
     ) -> None:
         """Create a client.
 
@@ -65,7 +66,8 @@ class SiteClient:
             lines: the lines of this site.
             context_of: function that returns the TLS context for a site. It checks the fleet's root
                 certificate and the site's name.
-            peer: function that raises `UrcError` for a revoked certificate in DER.
+            peer: function that returns the site of a certificate in DER. It raises `UrcError` for a
+                revoked certificate.
         """
         self._lines = lines
         self._peer = peer
@@ -123,10 +125,12 @@ class SiteClient:
             raise SiteFailed(f"no secure connection to the site {site}: {why}")
         der = holder[0].get_extra_info("ssl_object").getpeercert(binary_form=True)
         try:
-            self._peer(der or b"")
-        except UrcError as fault:
+            refusal = self._peer(der or b"").refusal("")
+        except UrcError as error:
+            refusal = str(error)
+        if refusal:
             holder[0].abort()
-            raise SiteFailed(f"no secure connection to the site {site}: {fault}") from fault
+            raise SiteFailed(f"no secure connection to the site {site}: {refusal}")
         return holder[0]
 
     @asynccontextmanager

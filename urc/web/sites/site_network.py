@@ -158,6 +158,7 @@ class SiteNetwork:
         new, self._present = sites - self._present, sites
         if self.member is None:
             return
+        self.member.sites_changed()
         for site in new:
             task = asyncio.create_task(self.member.exchange(self.client, site))
             self._tasks.add(task)
