@@ -189,7 +189,10 @@ class Member:
                 try:
                     await self._renew(client)
                 except (SiteFailed, FleetError) as fault:
-                    log.info("the certificate of this site was not renewed: %s", fault)
+                    # An absent authority is ordinary; a refusal needs the maintainer.
+                    is_refused = self._membership.authority in client.sites
+                    level = logging.WARNING if is_refused else logging.INFO
+                    log.log(level, "the certificate of this site was not renewed: %s", fault)
             self._news.clear()
             with suppress(TimeoutError):
                 async with asyncio.timeout(_RENEW_S):
