@@ -150,6 +150,8 @@ class Access:
         for name, value in headers:
             scheme, _, text = value.decode("latin-1").partition(" ")
             if name == b"authorization" and scheme.lower() == SCHEME.lower():
+                if refusal := peer.refusal():
+                    return Visitor(self, NOBODY, is_program=True), refusal
                 try:
                     visit = self.site_visitor(peer, text.strip())
                 except UrcError as fault:

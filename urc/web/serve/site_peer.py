@@ -5,8 +5,9 @@ Layer 5. Pure.
 
 from typing import Final, NamedTuple
 
-from cryptography import x509
 from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
+from urc.fleet.certificates import SiteCertificate, public_key_of
 
 __all__ = ["CERTIFICATE", "SitePeer", "site_of"]
 
@@ -26,8 +27,8 @@ class SitePeer(NamedTuple):
     is_invitation: bool = False
     """Whether the certificate is from an invitation: good for its renewal only."""
 
-    def refusal(self, path: str) -> str:
-        """Return why the site may not send a request to a path; "" if it may."""
+    def refusal(self, path: str = "") -> str:
+        """Return why the site may not send a request to a path; "" if it may. "" is any path."""
         if self.is_invitation and path != CERTIFICATE:
             return f"site {self.name} must first renew the certificate of its invitation"
         return ""
@@ -37,12 +38,9 @@ def site_of(certificate_der: bytes) -> SitePeer:
     """Return the site that a checked certificate names.
 
     Raises:
-        ValueError: the certificate names no site.
+        FleetError: the certificate is not the certificate of a site.
     """
-    certificate = x509.load_der_x509_certificate(certificate_der)
-    found = certificate.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
-    if len(found) != 1:
-        raise ValueError("the certificate names no site")
-    key = certificate.public_key()
+    found = SiteCertificate.parse(certificate_der)
+    key = public_key_of(found.certificate)
     pem = key.public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
-    return SitePeer(str(found[0].value), certificate.serial_number, pem, certificate_der)
+    return SitePeer(found.site, found.serial, pem, certificate_der, found.is_invitation)

@@ -101,7 +101,7 @@ class Member:
         self._membership.root.check(found, self._utc())
         if self._revoked.revokes(found.serial):
             raise FleetError(f"the certificate of site {found.site} is revoked")
-        return site_of(certificate_der)._replace(is_invitation=found.is_invitation)
+        return site_of(certificate_der)
 
     def renewed_for(self, csr_pem: bytes, peer: SitePeer) -> bytes:
         """Return a new certificate for another site, in PEM, with its chain.

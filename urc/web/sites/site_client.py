@@ -125,7 +125,7 @@ class SiteClient:
             raise SiteFailed(f"no secure connection to the site {site}: {why}")
         der = holder[0].get_extra_info("ssl_object").getpeercert(binary_form=True)
         try:
-            refusal = self._peer(der or b"").refusal("")
+            refusal = self._peer(der or b"").refusal()
         except UrcError as error:
             refusal = str(error)
         if refusal:
