@@ -7,6 +7,7 @@ output. The process ends with its standard input.
 import asyncio
 import subprocess
 import sys
+from collections.abc import Iterable
 from contextlib import suppress
 from io import RawIOBase
 from typing import Any, Final
@@ -17,12 +18,15 @@ _OUTPUT_BYTES: Final = 2**18
 """Number of unread output bytes at which the server stops reading from the process."""
 
 
-async def start_helper(module: str, *arguments: str) -> asyncio.subprocess.Process:
+async def start_helper(
+    module: str, *arguments: str, descriptors: Iterable[int] = ()
+) -> asyncio.subprocess.Process:
     """Start a module of URC as a process with pipes; its error messages are dropped.
 
     Args:
         module: name of the module, such as ``urc.transports.camera_process``.
         arguments: command-line arguments, which every user of this computer can read.
+        descriptors: file descriptors that the process inherits; no effect on Windows.
 
     Raises:
         OSError: the system cannot start the process.
@@ -31,6 +35,8 @@ async def start_helper(module: str, *arguments: str) -> asyncio.subprocess.Proce
     more: dict[str, Any] = {"start_new_session": True}
     if sys.platform == "win32":
         more = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    elif descriptors:
+        more["pass_fds"] = tuple(descriptors)
     # -P: nothing is imported from the current folder.
     return await asyncio.create_subprocess_exec(
         *(sys.executable, "-P", "-m", module, *arguments),

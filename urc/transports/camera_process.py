@@ -3,8 +3,9 @@
 ``python -m urc.transports.camera_process`` is started by `urc.transports.camera_transport`. A
 library written in C parses the bytes of a camera, so the parser has a process of its own. A hostile
 or stuck stream can neither block nor crash the server, and the system limits its memory. The
-process opens no connection to the network: the stream arrives on standard input or through the
-relay of URC. Only the datagrams of WHEP have sockets in this process (`urc.transports.whep_line`).
+process opens no connection to the network. The stream arrives on standard input, through the relay
+of URC, or on a UDP socket of the server. Only WHEP opens sockets in this process
+(`urc.transports.whep_line`).
 
 The first line of standard input is a `DemuxJob` as JSON. Standard output contains the records of
 `urc.transports.camera_records`.
@@ -27,6 +28,7 @@ from urc.transports.camera_records import (
     UnitQueue,
     record_of,
 )
+from urc.transports.datagram_source import DatagramSource, inherited
 from urc.transports.packet_reader import PacketWay, device_time_s, packet_way
 from urc.video import VideoUnit
 from urc.video_reader import VideoFault
@@ -99,7 +101,7 @@ def capture_s(packet: Any) -> float | None:
     return wall_us / 1e6 if wall_us > 0 else None
 
 
-def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
+def read_units(job: DemuxJob, source: RawIOBase | DatagramSource, queue: UnitQueue) -> None:
     """Read a stream until its end, and put its access units into a queue.
 
     Raises:
@@ -126,7 +128,7 @@ def read_units(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
     raise VideoFault("the camera ended the stream")
 
 
-def _opened(av: Any, job: DemuxJob, source: RawIOBase) -> Any:
+def _opened(av: Any, job: DemuxJob, source: RawIOBase | DatagramSource) -> Any:
     limits = {
         "probesize": str(PROBE_BYTES),
         "analyzeduration": str(PROBE_US),
@@ -257,8 +259,12 @@ def _read(job: DemuxJob, source: RawIOBase, queue: UnitQueue) -> None:
 
         read_whep(job, lambda: _line(source), lambda: _end_with(source), queue)
         return
-    if job.url or job.device:
+    if job.url or job.device or job.socket:
         threading.Thread(target=_end_with, args=(source,), daemon=True).start()
+    if job.socket:
+        datagrams = DatagramSource(inherited(job.socket), job.senders)
+        read_units(job._replace(format=datagrams.format()), datagrams, queue)
+        return
     read_units(job, source, queue)
 
 

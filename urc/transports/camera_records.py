@@ -53,6 +53,10 @@ class DemuxJob(NamedTuple):
     """Name of the library's demuxer; "" to detect it among the permitted formats."""
     over: str = "tcp"
     """Whether RTP packets travel over ``tcp`` or ``udp``."""
+    socket: str = ""
+    """For UDP: the bound socket, as `urc.transports.datagram_source.inherited` expects it."""
+    senders: tuple[str, ...] = ()
+    """For UDP: IP addresses of permitted senders; empty if any sender is permitted."""
     hosts: tuple[str, ...] = ()
     """For WHEP: IP addresses of the camera, the only targets of packets; otherwise empty."""
     own_hosts: tuple[str, ...] = ()

@@ -20,11 +20,11 @@ from urc.transports._faults import CLOSED, one_line
 from urc.transports._stream_dialer import StreamDialer
 from urc.transports.base import NOTICE, ConnectFailed, PeerClosed, TransportError
 from urc.transports.camera_options import CameraOptions
+from urc.transports.camera_port import CameraPort, listen
 from urc.transports.camera_records import FAULT, NOTE, OFFER, RECORD, DemuxJob
 from urc.transports.camera_relay import RtspRelay, RtspWatch
 from urc.transports.http_body import fault_of
 from urc.transports.http_client import HttpClient
-from urc.transports.udp import UdpTransport
 from urc.transports.web_dial import Dialer
 from urc.transports.whep_exchange import WhepExchange
 from urc.video import MAX_UNIT_BYTES
@@ -40,8 +40,6 @@ RESUME_S: Final = 5.0
 _END_S: Final = 1.0
 DEVICE_FORMAT: Final = "v4l2"
 """The library's name for cameras of this computer."""
-_TS_PACKET: Final = 188
-_TS_SYNC: Final = 0x47
 _MOST_BYTES: Final = MAX_UNIT_BYTES + 4096
 
 log = logging.getLogger(__name__)
@@ -151,9 +149,12 @@ class _CameraConnection:
         """Run a task that starts the process and writes the stream to it."""
         self._feeding = asyncio.create_task(self._fed(source))
 
-    async def start(self, job: DemuxJob) -> None:
-        """Start the process."""
-        self._process = await start_helper("urc.transports.camera_process")
+    async def start(self, job: DemuxJob, port: CameraPort | None = None) -> None:
+        """Start the process, which takes over a `port`."""
+        descriptors = () if port is None else (port.line.fileno(),)
+        self._process = await start_helper("urc.transports.camera_process", descriptors=descriptors)
+        if port is not None:
+            job = job._replace(socket=port.shared(self._process.pid), senders=port.senders)
         # Not an argument: every user of this computer can read arguments, and the URL of the relay
         # contains the password.
         await self.write(json.dumps(job._asdict()).encode() + b"\n")
@@ -329,34 +330,11 @@ async def _start_http(
 async def _start_udp(
     connection: _CameraConnection, options: CameraOptions, timeout_s: float
 ) -> None:
-    place = options.place
-    line = UdpTransport(
-        options.sender, listen=place.port, bind=place.host, accepts_any=not options.sender
-    )
-
-    async def read() -> None:
-        try:
-            data = await line.receive()
-            is_ts = len(data) % _TS_PACKET == 0 and data[0] == _TS_SYNC
-            # A stream without a container begins with a NAL unit; H.265 has longer headers.
-            found = "mpegts" if is_ts else "h264"
-            await connection.start(DemuxJob(format=found, transcode=options.transcode))
-            while True:
-                await connection.write(data)
-                data = await line.receive()
-        finally:
-            await line.close()
-
-    if options.sender:
-        await line.open(timeout_s)
-        connection.feed(read())
-        return
-
-    async def listen() -> None:
-        await line.open(FIRST_S)
-        await read()
-
-    connection.feed(listen())
+    port = await listen(options, timeout_s)
+    try:
+        await connection.start(DemuxJob(transcode=options.transcode), port)
+    finally:
+        port.line.close()
 
 
 async def _start_whep(

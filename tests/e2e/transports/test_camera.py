@@ -3,6 +3,7 @@
 import asyncio
 import os
 import signal
+import socket
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager, suppress
 from itertools import pairwise
@@ -305,6 +306,46 @@ async def test_udp(container: str) -> None:
         line(url=f"udp://127.0.0.1:{port}") as eye,
     ):
         await assert_streams(eye, 320, 240)
+
+
+@FFMPEG
+async def test_udp_after_a_new_connection() -> None:
+    """The port is free again as soon as the process has ended."""
+    port = free_port()
+    target = f"udp://127.0.0.1:{port}?pkt_size=1316"
+    async with (
+        program("ffmpeg", "-v", "error", *FILM, *H264, "-f", "mpegts", target),
+        line(url=f"udp://127.0.0.1:{port}") as eye,
+    ):
+        await unit(eye)
+        os.kill(readers()[0], signal.SIGKILL)
+        assert await reason(eye) == "the process that reads the camera's stream has ended"
+        await eye.open(10.0)
+        await assert_streams(eye, 320, 240)
+
+
+@FFMPEG
+async def test_udp_from_another_host_is_ignored() -> None:
+    port = free_port()
+    here, there = "localaddr=127.0.0.1", "localaddr=127.0.0.2"
+    target = f"udp://127.0.0.1:{port}?pkt_size=1316"
+    film = [*FILM, *H264, "-f", "mpegts"]
+    large = ["-re", "-f", "lavfi", "-i", "testsrc2=s=640x480:r=30", *H264, "-f", "mpegts"]
+    async with (
+        program("ffmpeg", "-v", "error", *large, f"{target}&{there}"),
+        program("ffmpeg", "-v", "error", *film, f"{target}&{here}"),
+        line(url=f"udp://127.0.0.1:{port}", host="localhost") as eye,
+    ):
+        await assert_streams(eye, 320, 240)
+
+
+async def test_udp_at_a_port_of_another_program() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 0))
+        port = other.getsockname()[1]
+        with pytest.raises(ConnectFailed, match=rf"cannot listen on udp 127\.0\.0\.1:{port} "):
+            async with line(url=f"udp://127.0.0.1:{port}"):
+                pass
 
 
 @FFMPEG
