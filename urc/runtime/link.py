@@ -53,6 +53,8 @@ SLICE_S = 0.001
 """Maximum time for which the engine may process bytes before other tasks run, in seconds; a slower
 engine receives fewer bytes."""
 _LEAST_SLICE_BYTES = 512
+_SLICE_PIECES = 16
+"""Maximum number of datagrams or messages that the engine processes before other tasks run."""
 _CHUNK_COST = 32
 """Fixed cost of a received chunk, counted as bytes, because many tiny chunks would also block the
 loop."""
@@ -415,13 +417,18 @@ class Link:
 
     async def _read(self) -> None:
         spent, size = 0, _LEAST_SLICE_BYTES
+        busy_s, pieces = 0.0, 0
         while True:
             self._is_reader_waiting = True
             data = await self._transport.receive()
             self._is_reader_waiting = False
             if isinstance(data, Envelope) or not self._is_stream:
+                began_s = self._clock.now()
                 self._receive(data)
-                await asyncio.sleep(0)
+                busy_s, pieces = busy_s + self._clock.now() - began_s, pieces + 1
+                if busy_s > SLICE_S or pieces >= _SLICE_PIECES:
+                    busy_s, pieces = 0.0, 0
+                    await asyncio.sleep(0)
                 continue
             at = 0
             while at < len(data):

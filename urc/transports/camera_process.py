@@ -120,7 +120,8 @@ def read_units(job: DemuxJob, source: RawIOBase | DatagramSource, queue: UnitQue
                 if job.device:
                     _read_device(container, found[0], way)
                 else:
-                    _read_stream(av, container, found[0], queue, early, way)
+                    reports = bool(job.url)  # sender reports of RTSP
+                    _read_stream(av, container, found[0], queue, early, way, has_reports=reports)
             finally:
                 way.end()
     except av.error.FFmpegError as fault:
@@ -158,6 +159,8 @@ def _read_stream(
     queue: UnitQueue,
     early: EarlyUnits,
     way: PacketWay,
+    *,
+    has_reports: bool,
 ) -> None:
     dated, convert = CapturedUnits(), _converter(av, stream)
     asked_s = time.monotonic()
@@ -166,7 +169,7 @@ def _read_stream(
         has_data = packet.size > 0  # the filter empties the packet
         if not early.is_over and (not has_data or early.ends(came_s - asked_s)):
             way.put(early.stamped())
-        captured_s = capture_s(packet)  # the filter drops it
+        captured_s = capture_s(packet) if has_reports else None  # the filter drops it
         for one in convert(packet) if has_data else ():
             unit = way.read(bytes(one), bool(one.is_keyframe), came_s)
             if unit is not None and early.is_over:

@@ -11,6 +11,7 @@ import logging
 import os
 from collections.abc import Coroutine
 from contextlib import suppress
+from math import inf
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -136,8 +137,13 @@ class _CameraConnection:
         self._relay: RtspRelay | None = None
         self._reason = ""
         self._started = asyncio.Event()
-        self._offer: asyncio.Future[bytes] = asyncio.get_running_loop().create_future()
+        self._loop = asyncio.get_running_loop()
+        self._offer: asyncio.Future[bytes] = self._loop.create_future()
         self._has_unit = False
+        self._limit_s = FIRST_S
+        self._due_s = inf
+        """Time at which `unit` has waited for too long; infinite if it does not wait."""
+        self._watch: asyncio.TimerHandle | None = None
         self._closing: asyncio.Task[None] | None = None
 
     async def use_relay(self, relay: RtspRelay, job: DemuxJob) -> None:
@@ -186,16 +192,34 @@ class _CameraConnection:
         Raises:
             PeerClosed: at the end, or after too long a pause.
         """
-        limit_s = SILENCE_S if self._has_unit else FIRST_S
+        self._limit_s = SILENCE_S if self._has_unit else FIRST_S
+        self._due_s = self._loop.time() + self._limit_s
+        if self._watch is None:
+            self._watch = self._loop.call_at(self._due_s, self._check_silence)
         try:
-            async with asyncio.timeout(limit_s):
-                await self._started.wait()
-                while (record := await self._record()) is None:
-                    pass
-        except TimeoutError as fault:
-            raise PeerClosed(f"{self._address} sent no image for {limit_s:g} s") from fault
+            await self._started.wait()
+            while (record := await self._record()) is None:
+                pass
+        finally:
+            self._due_s = inf
         self._has_unit = True
         return record
+
+    def _check_silence(self) -> None:
+        """End a wait of `unit` that is too long.
+
+        One timer for many images: a time limit for each one would cost as much as reading it.
+        """
+        self._watch = None
+        if self._due_s == inf:
+            return
+        if self._loop.time() < self._due_s:
+            self._watch = self._loop.call_at(self._due_s, self._check_silence)
+            return
+        self._reason = self._reason or f"{self._address} sent no image for {self._limit_s:g} s"
+        self._started.set()
+        if self._process is not None and self._process.stdout is not None:
+            self._process.stdout.set_exception(PeerClosed(self._reason))
 
     async def _record(self) -> Payload | None:
         """Return the next access unit or notice; None for a record of another kind."""
@@ -249,6 +273,8 @@ class _CameraConnection:
         If the caller is cancelled, the end still goes on.
         """
         self._reason = self._reason or CLOSED
+        if self._watch is not None:
+            self._watch.cancel()
         self._kill()
         if self._closing is None:
             self._closing = asyncio.create_task(self._close())

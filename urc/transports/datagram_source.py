@@ -67,9 +67,12 @@ class DatagramSource:
         """Return the next datagram of a permitted sender."""
         while True:
             try:
-                count, sender = self._line.recvfrom_into(self._buffer)
+                if not self._senders:
+                    count, is_permitted = self._line.recv_into(self._buffer), True
+                else:
+                    count, sender = self._line.recvfrom_into(self._buffer)
+                    is_permitted = str(sender[0]).partition("%")[0] in self._senders
             except ConnectionError:
                 continue  # Windows reports refusals of other programs' datagrams
-            host = str(sender[0]).partition("%")[0]
-            if count and (not self._senders or host in self._senders):
+            if count and is_permitted:
                 return bytes(self._buffer[:count])

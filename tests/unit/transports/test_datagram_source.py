@@ -33,6 +33,9 @@ class Line:
         buffer[: len(data)] = data
         return len(data), (host, 4000)
 
+    def recv_into(self, buffer: memoryview) -> int:
+        return self.recvfrom_into(buffer)[0]
+
 
 def source(*datagrams: tuple[bytes, str], senders: Iterable[str] = ()) -> DatagramSource:
     line: Any = Line(datagrams)
