@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 from bench.rig.operator_process import Page, _frame_of
 from bench.rig.operator_process import Plan as PagePlan
 
-__all__ = ["Plan"]
+__all__ = ["PicturePage", "Plan", "WatchingPage"]
 
 PERIOD_NS = 50_000_000
 SETTLE_S = 30.0
@@ -75,6 +75,9 @@ class PicturePage(Page):
 class WatchingPage(Page):
     """The page."""
 
+    pictures_page = PicturePage
+    """Class of its socket for images."""
+
     def __init__(self, plan: Plan) -> None:
         self.trips_ms: list[float] = []
         self.stops = 0
@@ -85,7 +88,7 @@ class WatchingPage(Page):
         while not self.pictures and not self.is_closed:
             self.wait(time.monotonic_ns() + PERIOD_NS)
         if plan.way == "apart":
-            self.spare = PicturePage(first, self.pictures)
+            self.spare = self.pictures_page(first, self.pictures)
         if plan.way != "none":
             more = {"apart": True} if plan.way == "apart" else {}
             self.say({"t": "show", "signals": plan.signals, **more})
