@@ -18,6 +18,8 @@ class Line:
         self.now_s = 0.0
         self.window = DeliveryWindow(0.0)
         self.sent_bytes = 0
+        self.stands_s, self.every_s = 0.0, 1.0
+        """For how long the page confirms nothing, and how often."""
         self.waits: list[float] = []
         """Time that each part has waited for the line, in seconds."""
         self._free_s = 0.0
@@ -45,6 +47,7 @@ class Line:
         if is_asked:
             last_s = self._coming[-1][0] if self._coming else 0.0
             came_s = self._free_s + self.trip_s + self._random.uniform(0.0, self.jitter_s)
+            came_s += max(0.0, self.stands_s - came_s % self.every_s)
             self._coming.append((max(last_s, came_s), self.sent_bytes))
 
 
@@ -87,6 +90,14 @@ def test_single_late_confirmations_do_not_shrink_the_window() -> None:
     line = Line(1_250_000, 0.02, jitter_s=0.02)
     line.busy_until(20.0)
     assert line.sent_bytes / 20 > 500_000
+
+
+def test_a_page_that_is_busy_again_and_again_keeps_its_window() -> None:
+    """A tablet with other work confirms late. Its line is fast, and a keyframe fits into it."""
+    line = Line(12_500_000, 0.001)
+    line.stands_s, line.every_s = 0.06, 0.15
+    line.busy_until(20.0, lambda now_s: line.sent_bytes < 750_000 * now_s)
+    assert line.window.size > 40_000
 
 
 def test_data_without_a_confirmation_never_block_the_line() -> None:

@@ -5,9 +5,9 @@ the kernel or in a modem, and everything else waits behind them. The window ther
 bytes that the page has not confirmed.
 
 Theory of operation. The delay of a confirmation grows as soon as data wait on the line. The window
-shrinks when the smallest of the last delays exceeds the shortest known delay by `QUEUE_S`. The new
-size keeps the line just busy. On lines with a long delay, more may wait. The window grows
-while the line is busy and nothing waits. On a line that others fill, the images therefore give way.
+shrinks when all delays of 0.1 s exceed the shortest known delay by `QUEUE_S`. The new size keeps
+the line just busy. On lines with a long delay, more may wait. The window grows while the line is
+busy and nothing waits. On a line that others fill, the images therefore give way.
 """
 
 from collections import deque
@@ -31,6 +31,9 @@ _QUEUE_SHARE: Final = 0.25
 """Permitted wait on lines with a long delay, as a share of the shortest delay."""
 _DELAYS: Final = 5
 """Number of delays whose smallest one counts, because a single one may have other causes."""
+_STANDING_S: Final = 0.1
+"""Time for which data must wait on the line before the window shrinks, in seconds. A busy page or
+server confirms late as well, but not for so long."""
 _LEAST_SHARE: Final = 0.3
 _GROWTH: Final = 0.1
 """Share by which the window grows in each round trip, but at least by one packet."""
@@ -62,6 +65,8 @@ class DeliveryWindow:
         self._unasked = 0
         self._busy_s = now_s
         self._delays: deque[float] = deque(maxlen=_DELAYS)
+        self._waits_s: float | None = None
+        """Time since which each confirmation shows that data wait on the line; None if not."""
         self._shortest = _Extreme(now_s, _SHORTEST_FOR_S)
         self._fastest = _Extreme(now_s, _FASTEST_FOR_S)
         self._is_full = False
@@ -122,8 +127,13 @@ class DeliveryWindow:
         shortest_s = self._shortest.least or 0.0
         least_s = min(self._delays)
         queue_s = max(QUEUE_S, _QUEUE_SHARE * shortest_s)
+        if delay_s - shortest_s <= queue_s:
+            self._waits_s = None
+        elif self._waits_s is None:
+            self._waits_s = now_s
         if least_s - shortest_s > queue_s:
-            if now_s - self._shrunk_s > delay_s:
+            is_standing = self._waits_s is not None and now_s - self._waits_s >= _STANDING_S
+            if is_standing and now_s - self._shrunk_s > delay_s:
                 share = (shortest_s + queue_s / 2) / least_s
                 self.size = max(LEAST_WINDOW, self.size * max(_LEAST_SHARE, share))
                 self._has_queued, self._shrunk_s = True, now_s
