@@ -74,7 +74,7 @@ PROGRAMS = {
     "motion_input": ("chromium",),
     "driving_lock": ("chromium", "ffmpeg"),
     "video_line": ("ffmpeg",),
-    "video_relay": ("ffmpeg",),
+    "video_relay": ("ffmpeg", "chromium"),
 }
 """Programs that each benchmark needs besides Python, as named in `scripts.needs`."""
 

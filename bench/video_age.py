@@ -6,8 +6,8 @@ stream in the same Chromium, one after the other. Both decode with WebCodecs. At
 a script reads the time from the canvas. The age includes filming, encoding, RTSP, decoding and
 drawing, but not the screen.
 
-Then a relay in front of the camera notes when the last packet of each access unit arrives
-(`bench.rig.rtsp_tap`), and a page without a browser notes when the same unit is complete there
+Then a relay in front of the camera notes when each access unit's last packet arrives
+(`bench.rig.rtsp_tap`). A page without a browser notes when the unit is complete there
 (`bench.rig.unit_page`). Checksums of the pictures match both. The difference is URC's delay.
 """
 

@@ -5,6 +5,8 @@ in a process for each camera, and sends the units to a page that confirms them. 
 datagram to its page as one WebSocket message. Both work in the same run, at the same time.
 
 Ten pages then show the same videos. The number of processes that take streams apart must not grow.
+
+At the end, a page in Chromium shows the four videos: see `bench.video_widgets`.
 """
 
 import json
@@ -22,6 +24,7 @@ from bench.line_page import Plan
 from bench.processes import cpu_s
 from bench.rig.programs import Program, Server
 from bench.video_films import RATE_HZ, film, profile, sending
+from bench.video_widgets import document, shown
 
 __all__ = ["run"]
 
@@ -45,7 +48,7 @@ def run(*, full: bool) -> Sequence[Result]:
         place = Path(folder)
         sent = film(place, FILM_KBIT)
         file = place / "film.yaml"
-        file.write_text(profile("film", ours), "utf-8")
+        file.write_text(profile("film", ours, more=document(CAMERAS)), "utf-8")
         server = stack.enter_context(Server([file], place / "data"))
         relay = stack.enter_context(
             Program([sys.executable, "-m", "bench.relay_datagrams", *map(str, theirs)])
@@ -60,6 +63,9 @@ def run(*, full: bool) -> Sequence[Result]:
         one, count = _measured(server, relay, pages[0], lasts_s), len(_cameras(server))
         pages += [_page(stack, server) for _ in range(PAGES - 1)]
         many, many_count = _measured(server, relay, pages[0], lasts_s), len(_cameras(server))
+        for page in pages:
+            page.close()
+        drawn = shown(f"http://127.0.0.1:{server.port}/robots/film/?key={server.key}", lasts_s)
     _tell("plain relay", 1, one.relay_s / lasts_s, 0)
     _tell("URC", 1, (one.server_s + one.cameras_s) / lasts_s, count)
     _tell("URC", PAGES, (many.server_s + many.cameras_s) / lasts_s, many_count)
@@ -69,6 +75,7 @@ def run(*, full: bool) -> Sequence[Result]:
     return [
         _result(f"{CAMERAS} videos: processor time / plain relay", GOAL, base_s, ours_s),
         _result(f"{CAMERAS} videos: demuxers of {PAGES} pages / of a page", 1.0, count, many_count),
+        *drawn,
     ]
 
 
