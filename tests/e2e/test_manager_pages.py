@@ -467,7 +467,7 @@ async def test_back_stops_what_is_held_and_gives_the_controls_back(new_page: Pag
         await first.evaluate("document.querySelector('[data-back]').click()")
         await robot.until_stopped()
         await first.wait_for_url(address.removesuffix("robots/puppet/"))
-        await expect(second.locator("[data-who]")).to_have_text("Free")
+        await expect(second.locator("[data-who]")).to_have_text("No one drives")
         assert robot.is_open
         await second.get_by_role("link", name="Back: disconnect").click()
         await until(lambda: not robot.is_open)

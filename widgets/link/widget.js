@@ -151,7 +151,7 @@ export default {
       if (latched) return { text: t("■ Stopped by {who}", { who: latched }), wishes: drives ? ["reset"] : [] };
       if (isMine && asker) return { text: t("◆ {who} asks to drive", { who: asker.name }), wishes: ["yes", "no"] };
       if (isMine) return { text: t("● You drive"), wishes: ["leave"] };
-      if (!holder) return { text: t("Free"), wishes: drives ? ["take"] : [] };
+      if (!holder) return { text: t("No one drives"), wishes: drives ? ["take"] : [] };
       const text = asker?.id === you ? t("Asked {who}", { who: holder.name }) : t("{who} is driving", { who: holder.name });
       return { text, wishes: drives ? [...(asker ? [] : ["ask"]), ...(forces ? ["force"] : [])] : [] };
     }

@@ -59,7 +59,7 @@ async def test_stop_acts_before_the_modules_have_loaded(new_page: PageMaker) -> 
         await expect(page.locator("[data-latched-text]")).to_have_text(re.compile("^■ Stopped by "))
         assert sorted(robot.line.texts) == BOTH_STOPPED
         await page.click("[data-verb='reset']")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
 
 
 @pytest.mark.parametrize("gesture", ["click", "Escape"])

@@ -89,7 +89,7 @@ async def opened(new_page: PageMaker, address: str) -> Page:
     page = await fresh(new_page)
     await page.goto(address)
     await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
-    await expect(page.locator("[data-who]")).to_contain_text(re.compile("Free|only watches"))
+    await expect(page.locator("[data-who]")).to_contain_text(re.compile("No one drives"))
     return page
 
 

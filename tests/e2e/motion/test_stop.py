@@ -39,7 +39,7 @@ async def test_stop_acts_when_it_is_touched_and_latches(new_page: PageMaker) -> 
         await asyncio.sleep(0.4)
         assert moved(robot.after(count)) == {}
         await page.evaluate("document.querySelector('[data-verb=reset]').click()")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
         await asyncio.sleep(0.4)
         assert robot.after(count) == [], "the same hand is still there"
         await page.mouse.up()
@@ -80,7 +80,7 @@ async def test_escape_and_the_click_of_a_screen_reader_stop_too(new_page: PageMa
         await until_text(page, NOTE, DONE)
         assert set(robot.line.texts) == {"drive stop", "lift stop"}
         await page.click("[data-verb='reset']")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
         count = len(robot.line.written)
         await page.evaluate(f"document.querySelector('{STOP}').click()")
         await until_text(page, NOTE, DONE)
@@ -145,7 +145,7 @@ async def test_a_press_that_slid_off_takes_nothing_from_the_next_one(new_page: P
         await page.mouse.move(10, 10)
         await page.mouse.up()
         await page.click("[data-verb='reset']")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
         await page.focus(STOP)
         await page.keyboard.press("Enter")
         await until_text(page, NOTE, DONE)
@@ -186,7 +186,7 @@ async def test_the_bar_names_the_reason_of_a_latched_stop_once(new_page: PageMak
         await expect(reset).not_to_have_attribute("data-pointed", "")
         await reset.click()
         await expect(page.locator("[data-cell='0']")).not_to_have_attribute("data-stopped", "")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
 
 
 async def test_stop_goes_by_a_request_when_the_socket_is_blocked(new_page: PageMaker) -> None:
@@ -278,7 +278,7 @@ async def test_a_latched_stop_holds_over_a_restart(new_page: PageMaker, tmp_path
         await page.mouse.up()
         assert robot.line.texts == []
         await page.click("[data-verb='reset']")
-        await until_text(page, "[data-who]", "Free")
+        await until_text(page, "[data-who]", "No one drives")
         assert robot.line.texts == [], "a reset starts nothing, and stops nothing"
         await push(page)
         await robot.until_moving()

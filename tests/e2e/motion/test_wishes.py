@@ -138,7 +138,7 @@ async def test_while_its_dead_man_loads_or_has_failed_a_page_drives_nothing(
         await page.reload(wait_until="commit")
         await page.locator("[data-cell='0'] [data-phase='idle']").wait_for()
         # Before the lease has arrived, the stick names the missing connection instead.
-        await expect(page.locator("[data-who]")).to_have_text("Free")
+        await expect(page.locator("[data-who]")).to_have_text("No one drives")
         await driven_in_vain(page)
         assert set(heard) <= {"DRIVE 0 0"}
         new_page.allow(page, lambda fault: "deadman/widget.js" in fault)

@@ -10,7 +10,9 @@
   // An alarm is a band below the bar, for as long as it lasts.
   const bands = document.querySelector(".urc-bands");
   const band = bands ? boxOf(bands) : new DOMRect();
-  let [ground, inside, bars] = [0, 0, 0];
+  const picture = document.querySelector('[data-place="ground"]');
+  const view = picture ? boxOf(picture) : new DOMRect();
+  let [ground, inside, bars, seen] = [0, 0, 0, 0];
   for (let y = STEP / 2; y < innerHeight; y += STEP) {
     if (y >= band.top && y < band.bottom) continue;
     for (let x = STEP / 2; x < innerWidth; x += STEP) {
@@ -19,6 +21,7 @@
         continue;
       }
       inside += 1;
+      seen += Number(x >= view.left && x < view.right && y >= view.top && y < view.bottom);
       ground += Number(Boolean(document.elementFromPoint(x, y)?.closest('[data-place="ground"]')));
     }
   }
@@ -100,6 +103,7 @@
   const isOverGround = document.querySelector('[data-place="ground"]') !== null;
   return {
     ground: Math.round((100 * ground) / inside),
+    clear: Math.round((100 * ground) / Math.max(1, seen)),
     bars: Math.round((1000 * bars) / (bars + inside)) / 10,
     isPicture: document.querySelector('[data-place="ground"][data-picture]') !== null,
     isOverGround, scrolls, faults, edges, sizes, gap,

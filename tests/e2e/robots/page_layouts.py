@@ -28,6 +28,8 @@ SCREENS = {
 }
 WIDE = ("phone, landscape", "tablet", "tablet, landscape", "desktop", "large")
 """Screens on which widgets are in front of the background."""
+CLEAR_PERCENT = 60
+"""Least share of the camera that no widget covers on a phone in portrait."""
 STICK_PX = (143, 221)
 """Sizes of a stick's face, with the rounding of half a pixel."""
 LANGUAGES = ("en-GB", "de-DE", "fr-FR", "it-IT")
@@ -101,6 +103,8 @@ def faults(seen: dict[str, Any], screen: str, is_large: bool) -> list[str]:
         return lines
     if seen["bars"] > (16 if "phone, " in screen or "small" in screen else 12):
         lines.append(f"the bars take {seen['bars']} % of the screen")
+    if screen not in WIDE and seen["isPicture"] and seen["clear"] < CLEAR_PERCENT:
+        lines.append(f"widgets leave {seen['clear']} % of the camera clear")
     if screen not in WIDE or not seen["isOverGround"]:
         return lines
     if seen["scrolls"]:

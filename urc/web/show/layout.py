@@ -59,6 +59,8 @@ REST = "-rest"
 """Suffix of ``data-page`` while a small screen shows the slots that its grid lacks."""
 LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
+_COVER = "var(--urc-height-cover)"
+"""Height of a value in front of the background on a phone in portrait."""
 _GAP = "var(--urc-space-3)"
 """Space between the rows of a grid over a background."""
 _MOST_LOW = 3
@@ -170,21 +172,10 @@ def _button(
         if missing:
             first, others = missing[0].name, len(missing) - 1
             shown = f"display:inline-flex;--urc-rest-count:{len(missing)}"
-            shown += f";--urc-rest:{_more(len(missing))}"
             shown += f";--urc-rest-first:{_css_string(titles.get(first, first))}"
-            shown += f";--urc-rest-others:{_more(others, ', ') or _css_string('')}"
+            shown += f";--urc-rest-others:{_css_string(f' +{others}' if others else '')}"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
-
-
-def _more(count: int, before: str = "") -> str:
-    """Return CSS for “3 more widgets” in the language of the page; "" for 0."""
-    if count == 1:
-        return f'"{before}" attr(data-rest-one)' if before else "attr(data-rest-one)"
-    if not count:
-        return ""
-    number = f'attr(data-rest-before) "{count}" attr(data-rest-after)'
-    return f'"{before}" {number}' if before else number
 
 
 def _css_string(text: str) -> str:
@@ -302,11 +293,15 @@ def _rules(place: str, grid: Layout, canvas: Canvas, screen: str) -> Iterator[st
     yield f"{place}{{{_template(grid, canvas, screen)}}}"
     places = {slot.name: slot for slot in grid.slots}
     is_below = screen == PHONE and bool(canvas.background)
+    covering = leading_values(grid, canvas) if is_below else 0
     if is_below:
-        yield f'{place} [data-place="ground"]{{{_ground(leading_values(grid, canvas))}}}'
+        yield f'{place} [data-place="ground"]{{{_ground(covering)}}}'
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
-            rules = _place(places.get(name), grid, canvas, is_below)
+            slot = places.get(name)
+            rules = _place(slot, grid, canvas, is_below)
+            if slot and slot.row < covering:
+                rules += f";--urc-cell-height:{_COVER}"
             if screen == SHORT and name in canvas.drawer and not place.endswith(f'{REST}"]'):
                 rules = "display:grid;grid-area:auto"
             yield f'{place} [data-place="{index}"]{{{rules}}}'
@@ -335,7 +330,7 @@ def _ground(covered: int) -> str:
     area = f"grid-row:1/{2 + covered}"
     if not covered:
         return area
-    height = f"calc({covered}*(var(--urc-height-value) + {_GAP}))"
+    height = f"calc({covered}*({_COVER} + {_GAP}))"
     return f"{area};--urc-ground-foot:{height};margin-block-end:calc(-.5*{_GAP})"
 
 

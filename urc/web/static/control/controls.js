@@ -39,6 +39,8 @@ export class Controls {
     this.pointing = undefined;
     this.who = part(el, "[data-who]");
     this.take = part(el, '[data-verb="take"]');
+    this.takeWho = part(el, "[data-take-who]");
+    this.takeWay = part(el, "[data-take-way]");
     this.latched = part(root, "[data-latched]");
     this.latchedText = part(root, "[data-latched-text]");
     this.latchedNext = part(root, "[data-latched-next]");
@@ -166,12 +168,12 @@ export class Controls {
     if (iAsk) return t("Asked {who}: {seconds} s", { who: holder, seconds: leftS });
     if (lease.holder) return t("{who} is driving", { who: holder });
     if (lease.latched) return ""; // the bar says it
-    return lease.drives ? t("Free") : t("No one is driving; this page only watches");
+    return lease.drives ? t("No one drives") : t("No one drives; this page only watches");
   }
 
   /**
    * Name the button that says who drives, and how to drive: a touch of a stick does the same as a press
-   * of the button.
+   * of the button. The state is the first line, and the way to drive a quieter second line.
    *
    * @param {string} who
    */
@@ -179,10 +181,11 @@ export class Controls {
     const sticks = document.querySelectorAll(STICK).length;
     const held = this.input.grips.size > 0 ? t("hold a control") : t("take control");
     const way = sticks === 0 ? held : sticks === 1 ? t("touch the stick") : t("touch a stick");
-    const text = `${who}: ${way}`;
-    if (this.take.textContent === text) return;
-    this.take.textContent = text;
-    this.take.setAttribute("aria-label", `${text}. ${t("Take control")}`);
+    const name = `${who}: ${way}. ${t("Take control")}`;
+    if (this.take.getAttribute("aria-label") === name) return;
+    this.takeWho.textContent = who;
+    this.takeWay.textContent = way;
+    this.take.setAttribute("aria-label", name);
   }
 
   /** Return the text in the bar for a latched STOP. */

@@ -41,16 +41,28 @@ export function watchRest(root, stage, leave, signal) {
 }
 
 /**
- * Name the button “4 more widgets”, because the text in the bar comes from the style sheet.
+ * Name the button “Attitude +3: 4 more widgets”, because the text in the bar comes from the style sheet.
  *
  * @param {HTMLElement} button
  */
 function name(button) {
-  const count = Number(getComputedStyle(button).getPropertyValue("--urc-rest-count"));
+  const style = getComputedStyle(button);
+  const count = Number(style.getPropertyValue("--urc-rest-count"));
   button.parentElement?.toggleAttribute("data-crowded", count > 0);
   if (!count) return; // this screen has all widgets
-  const { restOne = "", restBefore = "", restAfter = "" } = button.dataset;
-  const title = (count === 1 ? restOne : `${restBefore}${count}${restAfter}`).replaceAll("\u00a0", " ");
+  const { restOne = "", restMany = "" } = button.dataset;
+  const seen = textOf(style.getPropertyValue("--urc-rest-first")) + textOf(style.getPropertyValue("--urc-rest-others"));
+  const title = `${seen}: ${count === 1 ? restOne : restMany.replace("{count}", String(count))}`;
   button.title = title;
   button.setAttribute("aria-label", title);
+}
+
+/**
+ * Return the text of a string literal of the grid's rules: without quotes and escapes.
+ *
+ * @param {string} literal
+ */
+function textOf(literal) {
+  const inside = literal.trim().slice(1, -1);
+  return inside.replace(/\\([0-9a-f]{1,6}) ?/gi, (_, digits) => String.fromCodePoint(parseInt(digits, 16)));
 }

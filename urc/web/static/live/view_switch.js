@@ -65,7 +65,7 @@ export class ViewSwitch {
     const { host, input, wake } = this.doors;
     swapViews(this.el);
     this.ends = new AbortController();
-    keepBarTools(part(this.root, "[data-bar-place]"), this.el, this.ends.signal);
+    keepBarTools(part(this.root, "[data-bar-place]"), part(this.root, "[data-menu-place]"), this.el, this.ends.signal);
     host.mountAll(this.el);
     keepFloatsFree(this.el, this.ends.signal);
     const letGo = () => input.letGo(t("another page was opened"));
