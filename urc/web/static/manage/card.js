@@ -88,6 +88,7 @@ async function show(look, picture) {
   const [url, old] = [URL.createObjectURL(picture), look.shown];
   look.shown = url;
   image.src = url;
+  image.toggleAttribute("data-drawing", picture.type.startsWith("image/svg"));
   await image.decode().finally(() => URL.revokeObjectURL(old));
   look.el.dataset["shows"] = "picture";
   image.hidden = false;
