@@ -127,19 +127,19 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
         await expect(page.locator(GROUND_CELL)).not_to_have_attribute("data-old", re.compile(""))
 
 
-@pytest.mark.parametrize("size", ["phone", "tablet"])
-async def test_controls_are_out_of_sight_until_the_robot_is_back(
-    new_page: PageMaker, size: Size
+async def test_controls_behind_the_card_are_out_of_sight_until_the_robot_is_back(
+    new_page: PageMaker,
 ) -> None:
-    """The card is in their place; STOP and a control with the focus stay in sight."""
-    lift = WidgetUse("lift", "hold-button", {}, {"held": "lift"})
-    robot = seeing_robot(lift)
+    """Below the last picture of a phone; STOP and a control with the focus stay in sight."""
+    robot = lifting_robot()
     async with running_dashboard(robot) as address:
-        page = await new_page(size=size)
+        page = await new_page(size="phone")
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
-        control = page.locator(".urc-cell:has(.hold-button)")
+        control = page.locator(".urc-cell:has(.hold-button)").last
         await expect(control).to_have_css("opacity", "1")
+        robot.set_reading("eye", plain(RED))
+        await until_attribute(page, ".camera", "data-state", "live")
         robot.link("lost", REFUSED)
         await expect(page.locator(CARD)).to_be_visible()
         await expect(control).to_have_css("opacity", "0")
@@ -196,12 +196,14 @@ async def test_on_a_phone_the_card_is_small_and_above_the_views(new_page: PageMa
 
 
 async def test_on_a_phone_the_card_is_next_to_stop_if_nobody_drives(new_page: PageMaker) -> None:
-    """The row of the driver is empty, so the card takes its place."""
+    """The row of the driver is empty, so the card takes its place below the last picture."""
     robot = lifting_robot()
     async with running_dashboard(robot) as address:
         page = await new_page(size="phone")
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
+        robot.set_reading("eye", plain(RED))
+        await until_attribute(page, ".camera", "data-state", "live")
         robot.link("lost", REFUSED)
         await expect(page.locator(CARD)).to_be_visible()
         await page.wait_for_function(
@@ -212,6 +214,27 @@ async def test_on_a_phone_the_card_is_next_to_stop_if_nobody_drives(new_page: Pa
             }"""
         )
         await page.wait_for_function(f"() => ({COVERED})().length === 0")
+
+
+@pytest.mark.parametrize("size", ["phone", "tablet", "desktop"])
+async def test_without_a_picture_the_card_is_in_the_background_and_controls_say_why(
+    new_page: PageMaker, size: Size
+) -> None:
+    lift = WidgetUse("lift", "hold-button", {}, {"held": "lift"})
+    robot = seeing_robot(lift)
+    async with running_dashboard(robot) as address:
+        page = await new_page(size=size)
+        await lose(page, address, robot)
+        await expect(page.locator("[data-lost-age]")).to_have_text("No picture: not connected")
+        await page.wait_for_function(f"() => ({COVERED})().length === 0")
+        control = page.locator(".urc-cell:has(.hold-button)")
+        await expect(control).to_have_css("opacity", "1")
+        said = "(el) => getComputedStyle(el, '::before').content"
+        note = control.locator(".urc-why, .urc-foot-note, .urc-board-note")
+        assert await note.evaluate(said) == '"◆ No link"'
+        boxes = [await one.bounding_box() for one in (page.locator(CARD), control)]
+        card, below = (box for box in boxes if box)
+        assert card["y"] + card["height"] <= below["y"] or card["x"] >= below["x"] + below["width"]
 
 
 COVERED = """() => {

@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { install } from "./dom.mjs";
 import { Badge } from "../../urc/web/static/live/badge.js";
 import { causeWords, placeOf } from "../../urc/web/static/core/connection_causes.js";
-import { lastWords, lossOf, lowestGap, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
+import { emptyWords, lastWords, lossOf, lowestGap, triesWords, waitsIn, wordsOf } from "../../urc/web/static/live/lost_card.js";
 import { Store } from "../../urc/web/static/live/store.js";
 
 /** @returns {any} a socket that is up */
@@ -44,6 +44,9 @@ test("the card says how old the background behind it is", () => {
   assert.equal(lastWords(ground({ "data-old-age": "12 s" })), "Last values: 12 s ago");
   assert.equal(lastWords(ground({ "data-picture": "" })), "", "nothing was received");
   assert.equal(lastWords(null), "");
+  assert.equal(emptyWords(ground({ "data-picture": "" })), "No picture: not connected");
+  assert.equal(emptyWords(ground({ "data-old-age": "12 s", "data-picture": "" })), "");
+  assert.equal(emptyWords(ground({})), "", "a map, for example");
 });
 
 test("a page waits for the server, and for a connection that is not open yet", () => {

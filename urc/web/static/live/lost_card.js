@@ -22,6 +22,8 @@ const TRYING_MS = 1500;
 const GAP_PX = 8;
 /** Cells in front of the background that only show something large. */
 const VIEWS = '.urc-grid > .urc-cell[data-footprint="view"]:not([data-place="ground"])';
+/** Cells that do nothing while the robot is lost. */
+const CONTROLS = `.urc-grid > .urc-cell:is([data-footprint="stick"], [data-footprint="lever"], [data-footprint="button"])`;
 /** Cells that the card never covers: values, STOP, and a control in use. */
 const KEPT = `.urc-grid > .urc-cell:not([data-footprint="stick"], [data-footprint="lever"], [data-footprint="button"], [data-footprint="view"]), .urc-grid > .urc-cell:is(.urc-asking, :focus-within, :has(> .stop)):not([data-footprint="view"])`;
 
@@ -82,7 +84,8 @@ export class LostCard {
     const isShown = loss !== null && (!this.wasGood || nowMs - this.lostMs >= GRACE_MS);
     const tries = isShown ? triesWords(loss, store, this.kindMs, nowMs) : "";
     if (this.tries.textContent !== tries) this.tries.textContent = tries;
-    const age = isShown ? lastWords(this.root.querySelector('[data-place="ground"]')) : "";
+    const ground = this.root.querySelector('[data-place="ground"]');
+    const age = isShown ? lastWords(ground) || emptyWords(ground) : "";
     if (this.age.textContent !== age) this.age.textContent = age;
     if (isShown && !this.el.hidden) this.place();
     const key = isShown ? JSON.stringify(loss) : "";
@@ -98,6 +101,44 @@ export class LostCard {
    * do not count, because the background at the top is one of them.
    */
   place() {
+    this.placeBox();
+    const card = boxOf(part(this.el, ".urc-lost-card"));
+    const controls = [...this.root.querySelectorAll(CONTROLS)].map(boxOf);
+    const isOver = (/** @type {DOMRect} */ one) =>
+      one.width > 0 && one.left < card.right && one.right > card.left && one.top < card.bottom && one.bottom > card.top;
+    this.root.toggleAttribute("data-lost-over", controls.some(isOver));
+  }
+
+  /** Put the card into the background without a picture, if the background has the room. */
+  placeEmpty() {
+    const ground = this.root.querySelector('.urc-grid > [data-place="ground"]');
+    const isEmpty = ground !== null && emptyWords(ground) !== "";
+    this.el.toggleAttribute("data-empty", isEmpty);
+    if (!ground || !isEmpty || matchMedia("(height < 30rem)").matches) return false;
+    const [room, view] = [boxOf(this.el), boxOf(ground)];
+    const { height } = boxOf(part(this.el, ".urc-lost-card"));
+    const end = isPortraitPhone() ? this.firstBelow(view) : view.bottom;
+    const spare = end - view.top - height;
+    if (spare < 2 * GAP_PX) return false;
+    this.el.style.setProperty("--urc-lost-top", `${Math.round(view.top - room.top + spare / 2)}px`);
+    return true;
+  }
+
+  /** Return the top of the first cell over the foot of the background. @param {DOMRect} view */
+  firstBelow(view) {
+    const cells = [...this.root.querySelectorAll('.urc-grid > .urc-cell:not([data-place="ground"])')].map(boxOf);
+    return Math.min(view.bottom, ...cells.filter(({ width }) => width > 0).map(({ top }) => top));
+  }
+
+  placeBox() {
+    const isEmpty = this.placeEmpty();
+    this.el.toggleAttribute("data-in-picture", isEmpty);
+    if (isEmpty) {
+      this.el.removeAttribute("data-low");
+      this.el.removeAttribute("data-top");
+      for (const view of this.root.querySelectorAll(VIEWS)) view.removeAttribute("data-behind");
+      return;
+    }
     const room = this.el.getBoundingClientRect();
     const card = part(this.el, ".urc-lost-card").getBoundingClientRect();
     const { paddingTop, paddingBottom } = getComputedStyle(this.el);
@@ -222,6 +263,16 @@ export function lastWords(ground) {
   const age = ground?.getAttribute("data-old-age");
   if (!ground || !age) return "";
   return ground.hasAttribute("data-picture") ? t("Last picture: {age} ago", { age }) : t("Last values: {age} ago", { age });
+}
+
+/**
+ * Return the words for a background without a picture; "" for any other background.
+ *
+ * @param {Element | null} ground
+ */
+export function emptyWords(ground) {
+  if (!ground?.hasAttribute("data-picture") || ground.hasAttribute("data-old-age")) return "";
+  return t("No picture: not connected");
 }
 
 /**
