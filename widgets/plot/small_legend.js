@@ -88,7 +88,7 @@ function isCut(el) {
 /** Return the width of an entry's content in pixels. @param {Element} item */
 function widthOf(item) {
   const parts = [...(item.firstElementChild?.children ?? [])];
-  const widths = parts.map((part) => (part instanceof HTMLElement ? part.offsetWidth : 0));
+  const widths = parts.map((part) => (part instanceof HTMLElement ? part.offsetWidth : 0)).filter((width) => width > 0);
   const gap = parseFloat(getComputedStyle(item.firstElementChild ?? item).columnGap) || 0;
   return widths.reduce((sum, width) => sum + width + gap, -gap);
 }
