@@ -13,6 +13,8 @@ import urllib3
 from websockets.asyncio.client import ClientConnection, connect
 
 from tests.e2e.transports.certificates import Authority, Pair
+from urc.access.control import AccessControl
+from urc.access.store import AccessStore
 from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
 from urc.web.app import DashboardOptions, Robot, build_app, serve
@@ -118,7 +120,8 @@ async def place(
     claims: str = "",
 ) -> AsyncIterator[Place]:
     """Run a site; with `claims`, its bus has another name than its certificate."""
-    access = Access()
+    store = AccessStore(keys.folder / "people")
+    access = Access(AccessControl(store))
     network = SiteNetwork(keys, net.bus(claims or keys.site), policy=policy)
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
@@ -135,6 +138,7 @@ async def place(
     finally:
         task.cancel()
         await asyncio.wait((task,), timeout=WAIT_S)
+        store.close()
 
 
 async def message(line: ClientConnection, kind: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import urc.client
 from tests.e2e.dashboards import until
 from tests.e2e.fleet.places import Place, keys_of, message, place
 from tests.e2e.transports.certificates import Authority
+from urc.access.grants import Grant
 from urc.client.remote import RemoteRobot
 from urc.problems import UrcError
 from urc.runtime.open_profile import open_document
@@ -170,6 +171,21 @@ async def test_the_site_grants_less_than_the_fleet_proposes(tmp_path: Path) -> N
         assert not fleet.robot.commands
         _, found, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}")
         assert found["robot"]["role"] == "watch"
+
+
+async def test_a_token_for_some_commands_only_watches_other_sites(fleet: Fleet) -> None:
+    """Its limit is known at its own site alone, so the assertion proposes less."""
+    store = fleet.zug.access.control.store
+    assert store is not None
+    now = fleet.zug.access.control.now()
+    program = store.add("program", "Patrol", [Grant("drive")], now=now, commands=("undock",))
+    _, token = store.open_sign_in(program.id, "token", now=now)
+    fleet.zug.access.control.load()
+    path = f"/api/v1/robots/{fleet.name}"
+    assert (await fleet.zug.ask(path, key=token))[1]["robot"]["role"] == "watch"
+    for command in ("dock", "undock"):
+        assert (await fleet.zug.ask(f"{path}/commands/{command}", {}, key=token))[0] == 403
+    assert not fleet.robot.commands
 
 
 async def test_a_site_may_refuse_all_visitors(tmp_path: Path) -> None:
