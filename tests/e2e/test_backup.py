@@ -3,6 +3,7 @@
 import signal
 import threading
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 from tests.e2e.command_line import run
@@ -28,12 +29,13 @@ def test_a_backup_of_a_running_server_is_restored_on_another_machine(
     is_over = threading.Event()
 
     def write() -> None:
-        """Add people without a pause, as a busy server does."""
-        store, number = AccessStore(old), 0
-        while not is_over.is_set():
-            number += 1
-            store.add("person", f"Student {number}", now=1e9)
-        store.close()
+        """Add and remove people without a pause, as a busy server does."""
+        with closing(AccessStore(old)) as store:
+            number = 0
+            while not is_over.is_set():
+                number += 1
+                student = store.add("person", f"Student {number}", now=1e9)
+                store.remove(student.id)
 
     writer = threading.Thread(target=write)
     writer.start()

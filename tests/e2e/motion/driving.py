@@ -153,7 +153,7 @@ async def opened(new_page: PageMaker, address: str, size: str = "desktop") -> Pa
     page = await fresh(new_page, size)
     await page.goto(address)
     await page.wait_for_function(
-        "() => document.querySelector('[data-who]').textContent.match(/driv|^Free/)"
+        "() => document.querySelector('[data-who]').textContent.match(/driv/)"
         " && document.querySelector('[data-cell=\"0\"] .joystick')?.dataset.phase === 'idle'"
     )
     return page

@@ -118,7 +118,7 @@ async def filmed(
             page = await fresh(new_page)
             await page.goto(address)
             await page.wait_for_function(
-                "() => document.querySelector('[data-who]').textContent.match(/driv|^Free/)"
+                "() => document.querySelector('[data-who]').textContent.match(/driv/)"
             )
             if has_camera:
                 await page.wait_for_function(

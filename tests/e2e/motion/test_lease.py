@@ -93,7 +93,7 @@ async def test_a_request_can_be_turned_down_and_the_controls_taken_over(
         await robot.until_stopped()
         await first.mouse.up()
         await wish(second, "leave")
-        await says(first, "^Free$")
+        await says(first, "^No one drives")
 
 
 async def test_a_page_that_only_watches_sees_all_and_drives_nothing(new_page: PageMaker) -> None:
@@ -101,7 +101,7 @@ async def test_a_page_that_only_watches_sees_all_and_drives_nothing(new_page: Pa
     async with calmly_driven() as (robot, address):
         page = await fresh(new_page)
         await page.goto(f"{address}?watch")
-        await says(page, "^No one is driving; this page only watches$")
+        await says(page, "^No one drives; this page only watches$")
         assert await page.locator("[data-verb]:visible").count() == 0
         await push(page)
         await page.wait_for_function(
@@ -125,7 +125,7 @@ async def test_a_page_that_goes_stops_and_coming_back_resumes_nothing(
         await robot.until_moving()
         await page.reload()
         await robot.until_stopped()
-        await says(page, "^Free$")
+        await says(page, "^No one drives")
         count = len(robot.line.written)
         await page.mouse.move(300, 300, steps=4)
         await asyncio.sleep(0.4)
@@ -149,7 +149,7 @@ async def test_a_line_that_is_lost_and_back_resumes_nothing(new_page: PageMaker)
         await page.wait_for_function(f"() => {line}")
         await page.evaluate(f"{line}.close()")
         await robot.until_stopped()
-        await says(page, "^Free$")
+        await says(page, "^No one drives")
         count = len(robot.line.written)
         await asyncio.sleep(0.4)
         assert robot.after(count) == []

@@ -170,7 +170,7 @@ async def test_stop_of_somebody_else_stops_who_drives(new_page: PageMaker) -> No
 
 
 async def test_the_bar_names_the_reason_of_a_latched_stop_once(new_page: PageMaker) -> None:
-    """Controls keep the reason for screen readers only; a press on one of them points at Reset."""
+    """Controls show one word, and the reason to screen readers; a press on one points at Reset."""
     async with calmly_driven() as (_robot, address):
         page = await opened(new_page, address)
         note, reset = page.locator("[data-cell='0'] .joystick-note"), page.locator(RESET)
@@ -178,7 +178,9 @@ async def test_the_bar_names_the_reason_of_a_latched_stop_once(new_page: PageMak
         await expect(page.locator("[data-latched-next]")).to_have_text("Reset to drive again")
         await expect(page.locator("[data-who]")).to_be_empty()
         await expect(note).to_have_text("◆ Reset STOP first.")
-        await expect(note).to_be_hidden()
+        await expect(note).to_have_css("font-size", "0px")
+        shown = await note.evaluate("(one) => getComputedStyle(one, '::before').content")
+        assert shown == '"◆ " "Stopped"'
         await expect(reset).not_to_have_attribute("data-pointed", "")
         await push(page)
         await expect(reset).to_have_attribute("data-pointed", "")

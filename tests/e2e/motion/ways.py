@@ -84,7 +84,7 @@ async def start_over(page: Page, width: int, height: int) -> None:
     await fire(page, BEGUN)
     await page.wait_for_function(
         "() => !document.fullscreenElement"
-        " && document.querySelector('[data-who]').textContent.match(/driv|^Free/)"
+        " && document.querySelector('[data-who]').textContent.match(/driv/)"
     )
     if page.viewport_size != {"width": width, "height": height}:
         await page.set_viewport_size({"width": width, "height": height})

@@ -54,7 +54,7 @@ async def shown(
         page = await fresh(new_page, size)
         await page.goto(address.replace("127.0.0.1", host))
         await page.wait_for_function(
-            "() => document.querySelector('[data-who]')?.textContent.match(/driv|^Free/)"
+            "() => document.querySelector('[data-who]')?.textContent.match(/driv/)"
             " && [...document.querySelectorAll('.urc-cell [data-phase]')]"
             ".every((el) => el.dataset.phase === 'idle' || el.dataset.phase === 'locked')"
         )
