@@ -180,7 +180,7 @@ async def test_the_bar_names_the_reason_of_a_latched_stop_once(new_page: PageMak
         await expect(note).to_have_text("◆ Reset STOP first.")
         await expect(note).to_have_css("font-size", "0px")
         shown = await note.evaluate("(one) => getComputedStyle(one, '::before').content")
-        assert shown == '"◆ " "Stopped"'
+        assert shown == '"◆ Stopped"'
         await expect(reset).not_to_have_attribute("data-pointed", "")
         await push(page)
         await expect(reset).to_have_attribute("data-pointed", "")
