@@ -132,7 +132,10 @@ def recorded(line: SlowLine) -> Path:
     command = [sys.executable, "-m", "urc.cli.main", "record", str(line.folder / "eye.yaml")]
     command += ["--for", "4s", "-o", str(target)]
     with Program(command, inside=line.relay.inside("b")) as recorder:
-        recorder.wait_until(lambda: not recorder.is_running, READY_S, "the recording")
+        # The program may still be ending when its last line has arrived.
+        recorder.wait_until(
+            lambda: any("readings of" in one for one in recorder.lines), READY_S, "the recording"
+        )
     return target
 
 
