@@ -82,8 +82,8 @@ class SiteWatch:
         self._known: dict[str, KnownSite] = {}
         self._looked_s = -WATCHED_S
         self._news = asyncio.Event()
-        self._robots: dict[tuple[str, str], Robot] = {}
-        """Robots by site and digest of their documents."""
+        self._robots: dict[FarName, tuple[str, Robot]] = {}
+        """The newest opened document of each robot: its digest, and the robot made from it."""
 
     @property
     def sites(self) -> dict[str, KnownSite]:
@@ -154,12 +154,12 @@ class SiteWatch:
                 (known.fault if known is not None else "")
                 or f"the site {far.site} has no robot called {far.robot}"
             )
-        robot = self._robots.get((far.site, one.digest))
-        if robot is None:
+        kept = self._robots.get(far)
+        if kept is None or kept[0] != one.digest:
             profile = await self._profile(far, one.digest)
             robot = Robot(profile, _defaults(profile), _no_session)
-            self._robots[far.site, one.digest] = robot
-        return replace(robot, is_emulated=one.summary.emulated)
+            kept = self._robots[far] = (one.digest, robot)
+        return replace(kept[1], is_emulated=one.summary.emulated)
 
     async def _ask(self, site: str) -> None:
         before = self._known.get(site)
