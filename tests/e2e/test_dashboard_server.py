@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import gc
 import json
 import socket
 from collections.abc import Callable
@@ -156,6 +157,21 @@ async def test_the_server_ends_while_pages_are_open() -> None:
         assert robot.is_open
     assert await until_closed(line) == 1012
     assert not robot.is_open
+
+
+@pytest.mark.parametrize("turns", range(5))
+async def test_a_client_that_comes_while_the_server_ends_is_hung_up(turns: int) -> None:
+    """The end comes a few turns of the loop after the call: before, while or after it is taken."""
+    async with running_dashboard(FakeRobot(dashboard_profile())) as address:
+        place = urlsplit(address)
+        late = socket.create_connection((place.hostname, place.port))
+        for _ in range(turns):
+            await asyncio.sleep(0)
+    with late:
+        late.settimeout(5)
+        with contextlib.suppress(ConnectionResetError):
+            assert late.recv(1) == b""
+    gc.collect()  # tells of a connection that nobody has closed
 
 
 async def test_a_signal_ends_the_process_while_pages_are_open(

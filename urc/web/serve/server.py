@@ -40,6 +40,8 @@ PING_TIMEOUT_S = 10.0
 GRACE_S = 2
 DATE_S = 1.0
 BACKLOG = 128
+SETUP_TURNS = 2
+"""Turns of the event loop until asyncio has set up a connection that it has accepted."""
 
 
 class FurtherPort(Protocol):
@@ -203,6 +205,19 @@ class _UvicornServer(uvicorn.Server):
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(DATE_S):
                     await self._ending.wait()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop accepting, complete the accepted connections, then close all of them.
+
+        asyncio loses a connection that it has accepted but not yet set up when its server closes
+        (https://github.com/python/cpython/issues/109564).
+        """
+        loop = asyncio.get_running_loop()
+        for listener in sockets or ():
+            loop.remove_reader(listener)
+        for _ in range(SETUP_TURNS):
+            await asyncio.sleep(0)
+        await super().shutdown(sockets)
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
