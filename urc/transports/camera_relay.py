@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from urc.transports._faults import one_line
 from urc.transports.base import ByteStream, PeerClosed, TransportError
+from urc.transports.rtsp_delimiters import UnitDelimiters
 
 __all__ = ["RtspRelay", "RtspWatch"]
 
@@ -70,6 +71,7 @@ class RtspRelay:
         """Initialise the relay, which owns `stream` from now on."""
         self._stream = stream
         self._watch = watch
+        self._delimiters = UnitDelimiters()
         self._loop = asyncio.get_running_loop()
         self._listener: socket.socket | None = None
         self._task: asyncio.Task[None] | None = None
@@ -143,4 +145,4 @@ class RtspRelay:
             data = await self._stream.read()
             if fault := self._watch.received(data):
                 raise PeerClosed(fault)
-            await self._loop.sock_sendall(end, data)
+            await self._loop.sock_sendall(end, self._delimiters.passed(data))

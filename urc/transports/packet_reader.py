@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 from urc.images import MAX_PIXELS
 from urc.transports.camera_records import DemuxJob, UnitQueue, put_units
 from urc.transports.jpeg_tables import usual_tables, with_tables
+from urc.transports.rtsp_delimiters import without_delimiter
 from urc.video import JPEG, MAX_UNIT_BYTES, VideoUnit
 from urc.video_reader import UnitReader, VideoFault
 
@@ -94,7 +95,7 @@ def _passing(stream: Any, began_s: float) -> _Read:
         extra = b""  # MP4 states it in another form; a filter adds it to the keyframes
     is_hevc = _PASSED[stream.codec_context.name]
     reader = UnitReader(is_hevc=is_hevc, extra=extra, began_s=began_s)
-    return lambda data, _, time_s: reader.unit(data, time_s)
+    return lambda data, _, time_s: reader.unit(without_delimiter(data), time_s)
 
 
 def _files(av: Any, stream: Any) -> _Read:
