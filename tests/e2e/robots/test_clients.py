@@ -21,6 +21,7 @@ from gpsdclient.client import GPSDClient
 from PIL import Image
 
 from scripts.node import node_executable
+from tests.conftest import NO_BUILD
 from tests.e2e.ports import free_port
 from tests.e2e.processes import UrcProcess
 from tests.e2e.robots.emulated import CLIENTS, WAIT_S, ask, emulate, told
@@ -95,7 +96,7 @@ async def test_a_ground_station_drives_the_rover(urc_process: Start) -> None:
     assert found["bad"] == 0
 
 
-@pytest.mark.skipif(find_spec("dashboard_client") is None, reason="ur_rtde is for x86-64 Linux")
+@pytest.mark.skipif(find_spec("dashboard_client") is None, reason=NO_BUILD)
 async def test_a_dashboard_client_runs_a_program_of_the_arm(urc_process: Start) -> None:
     """ur_rtde."""
     port = (await emulate(urc_process, "ur-e-series", ("port", "state_port")))["dashboard"]
