@@ -7,7 +7,7 @@ import { arrayField, paint, pixelAt, probe, rawField, readField } from "../../wi
 import {
   Trail, bearingOf, distance, gridStep, headingText, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
 } from "../../widgets/map/geo.js";
-import { bearing, crop, firstView, poseOf, target, tilted, turned } from "../../widgets/pano360/look.js";
+import { bearing, crop, firstView, poseOf, target, tilted, turned, verticalFov } from "../../widgets/pano360/look.js";
 import { Track, at, bearings, besides, kindOf, nearestOf, sector, shareOf, sideOf, zoneOf } from "../../widgets/range/sight.js";
 import { Even, NO_RAY, Uneven, faultOf } from "../../widgets/scan/fan.js";
 import { arc, band, chart, dots, graph, view } from "../../widgets/scan/paint.js";
@@ -307,6 +307,10 @@ test("one looks to the left with positive yaw, up with positive pitch", () => {
   assert.deepEqual(turned({ yaw: 170, pitch: 80, fov: 75 }, { yaw: 20, pitch: 30, zoom: 9 }), { yaw: -170, pitch: 89, fov: 110 });
   const { left, top, width, height } = crop({ yaw: 90, pitch: 0, fov: 90 }, 2);
   allNear([left, top, width, height], [0, 0.25, 0.5, 0.5]);
+  const narrow = crop({ yaw: 0, pitch: 0, fov: 90 }, 0.75);
+  allNear([narrow.width, narrow.height], [0.25, 2 / 3]);
+  near(verticalFov({ yaw: 0, pitch: 0, fov: 90 }, 2), 90);
+  near(verticalFov({ yaw: 0, pitch: 0, fov: 90 }, 0.5), (Math.atan(2) * 360) / Math.PI);
   assert.deepEqual(tilted({ alpha: 10, beta: 5 }, { alpha: 350, beta: 0 }), { yaw: 20, pitch: 5 });
 });
 

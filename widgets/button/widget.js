@@ -41,9 +41,14 @@ class Button {
     this.main = part(el, ".button-main");
     this.note = part(el, ".button-note");
     this.value = el.querySelector(".button-value");
+    this.doneHint = el.querySelector(".button-done");
     this.question = el.querySelector(".button-question");
     this.yes = el.querySelector(".button-yes");
     this.cooldownMs = 1000 * Number(options["cooldown"] ?? 0);
+    /** @type {unknown[]} States in which the command has nothing to do. */
+    this.doneIn = Array.isArray(options["done_in"]) ? options["done_in"] : [];
+    /** The robot's word for such a state while the robot is in it; otherwise "". */
+    this.done = "";
     this.isAsking = false;
     this.coldMs = -Infinity;
     /** Note about the state: its age, or the exceeded limit. */
@@ -88,13 +93,16 @@ class Button {
   }
 
   get isFree() {
-    return this.giver.isReady && !this.giver.isPending && !this.isAsking && !this.isCold;
+    return this.giver.isReady && !this.giver.isPending && !this.isAsking && !this.isCold && this.done === "";
   }
 
   /** @param {Reading | undefined} state */
   update(state) {
     if (!state) return;
     this.stateNote = noteOf(state, this.t);
+    // An old state may be wrong, and then the command may be needed.
+    const isDone = state.state === "live" && this.doneIn.includes(String(state.value));
+    this.done = isDone ? textOf(state, this.t) : "";
     attribute(this.root, "data-state", state.state);
     attribute(this.root, "data-alarm", state.alarm);
     if (this.value) write(this.value, textOf(state, this.t));
@@ -146,12 +154,16 @@ class Button {
     if (!isCold) clearInterval(this.cooling);
     const leftS = Math.ceil((this.coldMs - performance.now()) / 1000);
     const wait = isCold && !giver.isPending ? this.t("ready in {seconds} s", { seconds: leftS }) : "";
+    // A reason of the page comes first, and has the same place.
+    const isDone = this.done !== "" && !giver.isPending && !giver.reason;
+    const done = isDone ? this.t("already {state}", { state: this.done }) : "";
+    if (this.doneHint) write(this.doneHint, done);
     attribute(this.root, "data-phase", this.isAsking ? "asking" : giver.phase);
-    attribute(this.main, "aria-disabled", String(!giver.isReady || giver.isPending || isCold));
+    attribute(this.main, "aria-disabled", String(!giver.isReady || giver.isPending || isCold || isDone));
     attribute(this.main, "aria-busy", String(giver.isPending));
     this.main.hidden = this.isAsking;
     if (this.question instanceof HTMLElement) this.question.hidden = !this.isAsking;
-    write(this.note, giver.note(wait, this.stateNote));
+    write(this.note, giver.note(wait, this.doneHint ? "" : done, this.stateNote));
   }
 
   end() {

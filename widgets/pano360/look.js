@@ -7,7 +7,7 @@
  * @typedef {object} View
  * @property {number} yaw -180 to 180
  * @property {number} pitch -90 to 90
- * @property {number} fov degrees from top to bottom
+ * @property {number} fov degrees along the shorter side
  *
  * @typedef {object} Pose Metadata of the file (Photo Sphere XMP).
  * @property {number} heading heading of the image's middle, degrees clockwise from north; NaN if unknown
@@ -58,11 +58,23 @@ export function target({ yaw, pitch }) {
  * @param {number} aspect width by height of the box
  */
 export function crop({ yaw, pitch, fov }, aspect) {
-  const height = Math.min(1, fov / 180);
-  const width = Math.min(1, (fov * aspect) / 360);
+  const height = Math.min(1, fov / Math.min(1, aspect) / 180);
+  const width = Math.min(1, (fov * Math.max(1, aspect)) / 360);
   const middle = 0.5 - yaw / 360;
   const top = Math.min(1 - height, Math.max(0, 0.5 - pitch / 180 - height / 2));
   return { left: middle - width / 2, top, width, height };
+}
+
+/**
+ * Return the vertical field of view in degrees, for a field of view along the shorter side.
+ *
+ * @param {View} view
+ * @param {number} aspect width by height
+ */
+export function verticalFov({ fov }, aspect) {
+  if (aspect >= 1) return fov;
+  const half = Math.tan((fov * Math.PI) / 360) / Math.max(aspect, 0.2);
+  return (Math.atan(half) * 360) / Math.PI;
 }
 
 /**

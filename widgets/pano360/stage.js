@@ -13,7 +13,7 @@
  * @property {() => void} end
  */
 import { board } from "urc/kit";
-import { crop, target } from "./look.js";
+import { crop, target, verticalFov } from "./look.js";
 
 /** Maximum pixel density: a higher density is not visible and fills the memory of a phone. */
 const MOST_DENSITY = 1.5;
@@ -60,7 +60,7 @@ export function sphere(three) {
     },
     draw(view) {
       if (!texture) return;
-      camera.fov = view.fov;
+      camera.fov = verticalFov(view, camera.aspect);
       camera.updateProjectionMatrix();
       camera.lookAt(...target(view));
       renderer.render(scene, camera);

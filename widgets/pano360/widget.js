@@ -138,7 +138,7 @@ class Panorama {
       if (!from) return;
       const to = { x: event.clientX, y: event.clientY };
       const other = [...hands.entries()].find(([id]) => id !== event.pointerId)?.[1];
-      const scale = this.view.fov / Math.max(1, face.clientHeight);
+      const scale = this.view.fov / Math.max(1, Math.min(face.clientWidth, face.clientHeight));
       if (other) {
         const [before, after] = [gap(from, other), gap(to, other)];
         if (before > 0 && after > 0) this.turn({ zoom: before / after });

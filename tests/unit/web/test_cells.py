@@ -46,3 +46,4 @@ def test_a_button_warns_of_a_slide(level: Literal["normal", "hazardous"]) -> Non
     cell = widget_cell(0, state.use, state.profile._replace(driver=driver))
     assert ("slide to confirm" in cell.html) == (level == "hazardous")
     assert ("data-hazardous" in cell.html) == (level == "hazardous")
+    assert ("data-asks" in cell.html) == (level == "normal")

@@ -81,6 +81,8 @@ class WidgetContext:
     that a widget can omit their controls."""
     hazardous: tuple[str, ...] = ()
     """Names of the outputs whose command must always be confirmed with a slide."""
+    asking: tuple[str, ...] = ()
+    """Names of the outputs whose command always asks a question, hazardous commands included."""
 
 
 def render_widget(widget: Widget, context: WidgetContext) -> Markup:
@@ -126,8 +128,14 @@ def widget_context(use: WidgetUse, widget: Widget, profile: Profile, uid: str) -
     first = single | {name: many[0] for name, many in several.items() if many}
     title = use.title or _heading(widget, first, outputs)
     options = {**declared, **linked_options(use, profile.name)}
-    hazards = tuple(name for name, one in use.outputs.items() if _is_hazardous(one, profile))
-    return WidgetContext(title, options, {**single, **several}, widget.name, uid, outputs, hazards)
+    asking = {
+        name: known.confirm.level
+        for name, command in use.outputs.items()
+        if (known := profile.driver.commands.get(command)) and known.confirm
+    }
+    hazards = tuple(name for name, level in asking.items() if level == "hazardous")
+    inputs: dict[str, Signal | tuple[Signal, ...]] = {**single, **several}
+    return WidgetContext(title, options, inputs, widget.name, uid, outputs, hazards, tuple(asking))
 
 
 def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str, str]) -> str:
@@ -144,11 +152,6 @@ def _heading(widget: Widget, inputs: Mapping[str, Signal], outputs: Mapping[str,
         given = [called for name, called in outputs.items() if name not in aside]
         about = [*given, *about, *(outputs[name] for name in aside)]
     return next(iter(about), widget.title)
-
-
-def _is_hazardous(command: str, profile: Profile) -> bool:
-    known = profile.driver.commands.get(command)
-    return known is not None and known.confirm is not None and known.confirm.level == "hazardous"
 
 
 def _called(command: str, driver: Driver) -> str:
