@@ -26,6 +26,8 @@ def unhurried() -> Iterator[None]:
         patched.setattr("urc.motion.hold_to_run.LONGEST_LEASE_S", LONGEST_S)
         patched.setattr("urc.motion.freshness.OLDEST_S", LONGEST_S)
         patched.setattr("urc.client.remote_motion.OLDEST_S", LONGEST_S)
+        patched.setattr("urc.motion.link_age.FULL_SPEED_S", LONGEST_S)
+        patched.setattr("urc.motion.link_age.TOO_OLD_S", 2 * LONGEST_S)
         patched.setattr("urc.motion.freshness._KEPT", BEATS)
         patched.setattr("urc.web.drive.control_service.TOO_LATE_S", LONGEST_S)
         yield

@@ -48,8 +48,29 @@ function held() {
     hand.x = x;
     input.moved(/** @type {any} */ (grip));
   };
-  return { told, frame, move, input, control };
+  return { told, frame, move, input, control, drive };
 }
+
+test("a slow link of another site is named at the control, and so is an old image that is worse", () => {
+  const { input, control, drive } = held();
+  /** @param {number | null} percent @param {number} [image] */
+  const note = (percent, image) => {
+    Object.assign(drive, { input: percent === null ? null : { age: 0, percent } });
+    input.images.share = () => image ?? 1;
+    Object.assign(control, { sight: image === undefined ? null : { signal: "eye" } });
+    return input.slowNote(control);
+  };
+  assert.equal(note(null), "");
+  assert.equal(note(100), "");
+  assert.equal(note(57), "Slow link: 60 % of the speed");
+  assert.equal(note(57, 1), "Slow link: 60 % of the speed");
+  assert.equal(note(57, 0.2), "Old image: 20 % of the speed");
+  Object.assign(drive, { overrideMs: nowMs + 1000 });
+  assert.equal(note(57, 0.2), "Slow link: 60 % of the speed");
+  assert.equal(note(57, 0), "Driving without an image");
+  Object.assign(control, { phase: "spent" });
+  assert.equal(note(57), "");
+});
 
 test("a move goes out at once, also right behind the tick of a frame", () => {
   const { told, frame, move } = held();

@@ -16,7 +16,15 @@ from typing import Final, NamedTuple, TypeGuard
 from urc.model.exchange import Sight
 from urc.model.values import Reading
 
-__all__ = ["BLIND_S", "Permit", "SeenImage", "SentImages", "permit_of", "slowed"]
+__all__ = [
+    "BLIND_S",
+    "Permit",
+    "SeenImage",
+    "SentImages",
+    "permit_between",
+    "permit_of",
+    "slowed",
+]
 
 BLIND_S: Final = math.inf
 """Age of the image on a page that shows no image."""
@@ -37,12 +45,12 @@ class SeenImage(NamedTuple):
 
 
 class Permit(NamedTuple):
-    """The motion that an image of a certain age permits."""
+    """The motion that an image or a tick of a certain age permits."""
 
     share: float
     """Permitted share of the requested speed, from 0 to 1."""
     for_s: float
-    """Time until the image is too old, in seconds; 0 if it is too old."""
+    """Time until the image or tick is too old, in seconds; 0 if it is too old."""
 
 
 _NO_PERMIT: Final = Permit(0.0, 0.0)
@@ -100,13 +108,23 @@ class SentImages:
 
 def permit_of(sight: Sight, age_s: float) -> Permit:
     """Return the motion that an image with the age `age_s` permits; none at an age of NaN."""
-    if not age_s < sight.stop_after_s:
+    return permit_between(age_s, sight.slow_after_s, sight.stop_after_s)
+
+
+def permit_between(age_s: float, slow_after_s: float | None, stop_after_s: float) -> Permit:
+    """Return the motion that an age permits; none at an age of NaN.
+
+    Args:
+        age_s: age in seconds.
+        slow_after_s: age from which the permitted speed falls linearly; None for full speed.
+        stop_after_s: age from which nothing is permitted.
+    """
+    if not age_s < stop_after_s:
         return _NO_PERMIT
-    left_s = sight.stop_after_s - age_s
-    slow_s = sight.slow_after_s
-    if slow_s is None or age_s <= slow_s:
+    left_s = stop_after_s - age_s
+    if slow_after_s is None or age_s <= slow_after_s:
         return Permit(1.0, left_s)
-    return Permit(left_s / (sight.stop_after_s - slow_s), left_s)
+    return Permit(left_s / (stop_after_s - slow_after_s), left_s)
 
 
 def slowed(

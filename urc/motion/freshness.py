@@ -3,11 +3,15 @@
 The server sends numbered heartbeats to every page. Each input contains the number of the newest
 heartbeat received by its page, the epoch of its lease, and a sequence number. The server can
 therefore refuse inputs that were buffered, recorded and replayed, or sent under an earlier lease.
-The clocks of different machines are never compared.
+The clocks of different machines are never compared. `urc.motion.link_age` contains the limits for
+pages of other sites.
 """
 
 from collections import deque
 from typing import Final, NamedTuple
+
+from urc.motion import link_age
+from urc.motion.link_age import LinkAge
 
 __all__ = ["OLDEST_S", "DuplicateElimination", "Freshness", "ControlInput"]
 
@@ -30,13 +34,15 @@ class ControlInput(NamedTuple):
 class Freshness:
     """The heartbeats sent to one page and the page's newest input for each control."""
 
-    def __init__(self, first: int = 1) -> None:
+    def __init__(self, first: int = 1, link: LinkAge | None = None) -> None:
         """Start before the first heartbeat.
 
         Args:
             first: number of the first heartbeat. If the number is unpredictable, inputs that were
                 recorded before a restart are refused.
+            link: ages of the inputs of a page of another site; None for a page of this site.
         """
+        self.link = link
         self._issued: deque[float] = deque(maxlen=_KEPT)
         """Send times of the newest heartbeats, which have consecutive numbers."""
         self._number = first - 1
@@ -64,9 +70,14 @@ class Freshness:
         back = self._number - given.echo
         if not 0 <= back < len(self._issued):
             return "the input does not echo a heartbeat of this server"
-        issued_at = self._issued[-1 - back]
-        if now - issued_at > OLDEST_S:
-            return f"Link too slow: your input arrived {(now - issued_at) * 1000:.0f} ms late"
+        late_s = now - self._issued[-1 - back]
+        if self.link is None:
+            is_late = late_s > OLDEST_S
+        else:
+            late_s = self.link.measure(late_s, now)
+            is_late = late_s >= link_age.TOO_OLD_S
+        if is_late:
+            return f"Link too slow: your input arrived {late_s * 1000:.0f} ms late"
         self._newest[of] = given.number
         return ""
 

@@ -115,9 +115,10 @@ class HeldControl:
     needs_ready_line: bool
     """Whether a stop that is sent before the transport is ready must be repeated."""
     rests: Mapping[str, Reading]
-    """Value at rest of each argument that the driving lock slows, keyed by argument."""
-    is_sight_short: bool = False
-    """Whether the last tick's image limits the lease."""
+    """Value at rest of each argument that an old image or a slow link slows, keyed by argument."""
+    short_of: str = ""
+    """Message about the image or the link that shortens the lease since the last tick; "" for the
+    whole lease."""
     is_armed: bool = False
     is_lasting: bool = False
     """Whether the stop frame stays the same while the command is armed."""
@@ -174,7 +175,7 @@ def control_of(driver: Driver, command: Command) -> HeldControl:
     # line, the stop may collide with the robot's unfinished answer.
     needs_ready_line = bool(line.on_connect) or line.is_half_duplex
     period_s = period_of(driver, command)
-    rests = slowed_arguments(command) if hold.sight is not None else {}
+    rests = slowed_arguments(command)
     return HeldControl(command.transport, hold, period_s, slew, defaults, needs_ready_line, rests)
 
 

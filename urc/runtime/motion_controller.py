@@ -19,17 +19,16 @@ calling `stopped`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from secrets import randbelow
 
 from urc.model.driver import Command, Driver
 from urc.model.payload import CountedFrame, FrameVariants, Payload
 from urc.model.role import includes
 from urc.model.values import Reading
 from urc.motion.driving_lock import BLIND_S, slowed
-from urc.motion.freshness import ControlInput, Freshness
+from urc.motion.freshness import ControlInput
 from urc.motion.hold_to_run import HoldTerms, StopReport
 from urc.motion.lease import REQUEST_S, Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
+from urc.motion.link_age import LinkState
 from urc.problems import UrcError
 from urc.protocol.events import MotionEvent, MotionReady, MotionRefused, NumbersUsed
 from urc.runtime.held_commands import (
@@ -43,6 +42,7 @@ from urc.runtime.held_commands import (
 )
 from urc.runtime.image_interlock import OLD_IMAGE, ImageInterlock, why_blind
 from urc.runtime.motion_callbacks import Moved, unchanged, unrefused, unseen
+from urc.runtime.motion_screen import SLOW_LINK, MotionScreen
 
 __all__ = ["MotionFrames", "MotionController", "MotionBackend", "Verb", "is_lossy"]
 
@@ -50,17 +50,10 @@ Verb = str
 """A lease request: ``take``, ``ask``, ``yes``, ``no``, ``force``, ``leave``, ``reset``, or
 ``override``, which permits to drive without an image for a moment."""
 MOST_SCREENS = 256
-_FIRST_TICKS = 2**31
 _NO_ROBOT = "the robot is not connected"
 LET_GO = "Stopped: let go, then start again"
 _CUT = "Lost contact while driving"
 _TAKE_ANEW = "Stopped: take control again"
-
-
-@dataclass(slots=True)
-class _Screen:
-    client: Operator
-    freshness: Freshness = field(default_factory=lambda: Freshness(randbelow(_FIRST_TICKS) + 1))
 
 
 class MotionController:
@@ -89,7 +82,7 @@ class MotionController:
         self._controls = {name: control_of(driver, one) for name, one in self._holds.items()}
         self._stops = tuple(name for name, one in driver.commands.items() if one.stops)
         self._moves = any(one.moves for one in driver.commands.values())
-        self._screens: dict[str, _Screen] = {}
+        self._screens: dict[str, MotionScreen] = {}
         self._unconfirmed = {*self._holds, *self._stops} if is_owed else set[str]()
         self._cancels = tuple(
             name for name in self._stops if _is_cancellation(driver.commands[name])
@@ -153,10 +146,12 @@ class MotionController:
         """Return whether `command` is a held command."""
         return command in self._holds
 
-    def was_blind(self, command: str) -> bool:
-        """Return whether the image that the operator saw was too old, so that the motion ended."""
+    def why_short(self, command: str) -> str:
+        """Return why an old image or a slow link ended a motion; "" if neither did."""
         control = self._controls.get(command)
-        return control is not None and control.needs_release and control.why == OLD_IMAGE
+        if control is None or not control.needs_release:
+            return ""
+        return control.why if control.why in (OLD_IMAGE, SLOW_LINK) else ""
 
     def rests(self, command: str) -> bool:
         """Return whether a held command is at rest and its last stop was reported as written."""
@@ -242,7 +237,7 @@ class MotionController:
         """Add a page; raise `UrcError` if the maximum number of pages is reached."""
         if len(self._screens) >= MOST_SCREENS:
             raise UrcError(f"{MOST_SCREENS} pages already show this robot")
-        self._screens[client.id] = _Screen(client)
+        self._screens[client.id] = MotionScreen(client)
 
     def change(self, client: Operator) -> None:
         """Replace a page's rights; if it may no longer drive, its lease and its motion end."""
@@ -261,6 +256,11 @@ class MotionController:
     def heartbeat(self, client: str, now: float) -> int:
         """Return the number of a new heartbeat, which the page echoes in its inputs."""
         return self._screens[client].freshness.issue(now)
+
+    def link(self, client: str, now: float) -> LinkState | None:
+        """Return the link of a page of another site; None without recent ticks or such a link."""
+        link = self._screens[client].freshness.link
+        return None if link is None else link.state(now)
 
     # -- the lease
 
@@ -361,11 +361,11 @@ class MotionController:
         frames, backend = self._frames, self._backend
         if frames is None or backend is None:
             return _NO_ROBOT
-        permit = self.images.permit(command, client, age_s, now)
+        seen = self.images.permit(command, client, age_s, now)
+        if seen is not None and seen.for_s <= 0:
+            return self._end_blind(command, control, backend, age_s)
+        permit, control.short_of = screen.limit(seen, control.hold.lease_s)
         if permit is not None:
-            if permit.for_s <= 0:
-                return self._end_blind(command, control, backend, age_s)
-            control.is_sight_short = permit.for_s < control.hold.lease_s
             arguments = slowed(arguments, control.rests, permit.share)
         if control.slew is not None:
             arguments = control.limited(arguments, now)
@@ -471,7 +471,7 @@ class MotionController:
         if control.motion_state == "ending":  # otherwise, it is already moving again
             control.motion_state = "rest"
         if reason not in ("released", "stopped"):
-            late = OLD_IMAGE if reason == "expired" and control.is_sight_short else LET_GO
+            late = control.short_of if reason == "expired" and control.short_of else LET_GO
             self._close(control, _CUT if reason == "revoked" else late)
         if self._is_too_early(command, control):
             control.is_owed_again = True

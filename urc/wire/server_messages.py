@@ -34,6 +34,7 @@ __all__ = [
     "ErrorMessage",
     "OperatorRow",
     "LeaseMessage",
+    "InputRow",
     "HeartbeatMessage",
     "StoppedMessage",
     "RefusedMessage",
@@ -251,10 +252,22 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """Time for which the holder may still drive without an image, in milliseconds."""
 
 
+class InputRow(msgspec.Struct, frozen=True):
+    """The newest tick from another site; see `urc.motion.link_age`."""
+
+    age: int
+    """Age at the arrival, in milliseconds."""
+    percent: int
+    """Permitted share of the requested speed, in percent."""
+
+
 class HeartbeatMessage(Outbound, tag="beat", frozen=True):
     """A heartbeat number for the client that drives; the client echoes the number in its ticks."""
 
     n: int
+    input: InputRow | None = None
+    """The client's newest tick; None for clients of the robot's own site, and without recent ticks.
+    """
 
 
 class StoppedMessage(Outbound, tag="stopped", frozen=True):

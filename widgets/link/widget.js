@@ -31,6 +31,8 @@ export default {
     let skewMs = null;
     let messages = 0;
     let bytes = 0;
+    /** Age of this page's input at the robot's site; null at the robot's own site. @type {number | null} */
+    let inputMs = null;
     /** @type {readonly Link[]} */
     let links = [];
     let isReplay = false;
@@ -43,6 +45,7 @@ export default {
       ({ isUp, failures, skewMs, messages, bytes } = news);
       if (news.tripMs !== null && news.tripMs !== tripMs) trips.add(news.tripMs);
       tripMs = news.tripMs;
+      inputMs = news.inputMs ?? null;
       show();
     });
     follow("links", (news) => {
@@ -89,6 +92,7 @@ export default {
         [t("round trip"), tripMs === null ? DASH : `${figure(tripMs)} ms`],
         [t("median / 95 %"), trips.share(0.5) === null ? DASH : `${figure(trips.share(0.5))} / ${figure(trips.share(0.95))} ms`],
         [t("late"), late === null ? DASH : `${Math.round(100 * late)} %`],
+        ...(inputMs === null ? [] : [/** @type {[string, string]} */ ([t("age of input"), `${figure(inputMs)} ms`])]),
         [t("messages"), Number.isFinite(rate.messages) ? `${Math.round(rate.messages)} /s` : DASH],
         [t("data"), Number.isFinite(rate.bytes) ? `${(rate.bytes / 1000).toFixed(1)} kB/s` : DASH],
         [t("failed attempts"), String(failures)],

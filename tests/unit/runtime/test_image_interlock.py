@@ -82,7 +82,7 @@ def test_the_guard_that_stops_first_is_explained_by_the_image() -> None:
     it = scene()
     it.tick(speed=0.8, sees=0.55)
     it.controller.stopped("drive", "expired")
-    assert it.controller.was_blind("drive")
+    assert it.controller.why_short("drive") == OLD_IMAGE
     assert it.tick(speed=0.8, sees=0.0) == OLD_IMAGE
 
 
@@ -90,7 +90,7 @@ def test_a_lease_that_ended_by_itself_is_not_explained_by_the_image() -> None:
     it = scene()
     it.tick(speed=0.8, sees=0.0)
     it.controller.stopped("drive", "expired")
-    assert not it.controller.was_blind("drive")
+    assert it.controller.why_short("drive") == ""
 
 
 def test_other_commands_take_no_notice_of_images() -> None:

@@ -22,7 +22,7 @@ from urc.runtime.audit_entry import AuditEntry
 from urc.runtime.audit_recorder import AuditRecorder
 from urc.runtime.clock import Clock, Timer
 from urc.runtime.hub import Hub, LogEntry
-from urc.runtime.image_interlock import OLD_IMAGE, ImageInterlock
+from urc.runtime.image_interlock import ImageInterlock
 from urc.runtime.latch import Latch, LatchStore
 from urc.runtime.loop_watchdog import TOO_LATE_S, LoopWatchdog
 from urc.runtime.motion_controller import MotionBackend, MotionController
@@ -254,7 +254,8 @@ class ControlService:
         texts += operator.notices.values()
         operator.notices.clear()
         if operator.heartbeat is not None:
-            texts.append(wire.encode_beat(operator.heartbeat))
+            link = self.controller.link(operator.client.id, self._clock.now())
+            texts.append(wire.encode_beat(operator.heartbeat, link))
             operator.heartbeat = None
         return texts
 
@@ -446,15 +447,15 @@ class ControlService:
         self.controller.stopped(command, reason)
         if reason == "lost":
             return  # the stop is written again, and then reported
-        is_blind = reason == "expired" and self.controller.was_blind(command)
-        self.recorder.stopped(command, OLD_IMAGE if is_blind else reason, self._clock.now())
+        why = self.controller.why_short(command) if reason == "expired" else ""
+        self.recorder.stopped(command, why or reason, self._clock.now())
         if reason in ("released", "stopped"):
             return  # the operator released the control, or the lease message reports the stop
         for operator in self._operators.values():
             operator.moved_s.pop(command, None)
             text = wire.encode_stopped(command, reason)
-            if is_blind:
-                text = wire.encode_refused("tick", command, OLD_IMAGE)
+            if why:
+                text = wire.encode_refused("tick", command, why)
             operator.notice(command, text)
 
     def _refused(self, command: str, why: str) -> None:
@@ -518,7 +519,9 @@ class ControlService:
         now = self._clock.now()
         operator.heartbeat = self.controller.heartbeat(operator.client.id, now)
         if operator.spare is not None:
-            operator.spare.heartbeat(operator.heartbeat)
+            operator.spare.heartbeat(
+                operator.heartbeat, self.controller.link(operator.client.id, now)
+            )
         operator.wake()
         self._beating = self._clock.call_at(now + BEAT_S, self._heartbeat)
 

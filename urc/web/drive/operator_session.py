@@ -10,6 +10,7 @@ from typing import Final, Protocol
 from urc.motion.driving_lock import SentImages
 from urc.motion.freshness import DuplicateElimination
 from urc.motion.lease import LeaseState, Operator
+from urc.motion.link_age import LinkState
 from urc.motion.rate_limiter import RateLimiter
 from urc.runtime.clock import Timer
 from urc.web.feed.client_socket import FixedRights, PeerRights
@@ -28,8 +29,8 @@ _DRIVES: Final = FixedRights()
 class RedundantLine(Protocol):
     """A redundant socket, as seen by a session; see `urc.web.drive.redundant_socket`."""
 
-    def heartbeat(self, number: int) -> None:
-        """Send a heartbeat number to the page."""
+    def heartbeat(self, number: int, link: LinkState | None) -> None:
+        """Send a heartbeat number, and the state of a link from another site, to the page."""
 
     def end(self) -> None:
         """Close the socket."""

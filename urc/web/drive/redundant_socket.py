@@ -14,6 +14,7 @@ import msgspec
 from starlette.websockets import WebSocketDisconnect
 
 from urc.motion.freshness import DuplicateElimination
+from urc.motion.link_age import LinkState
 from urc.runtime.clock import Clock, within
 from urc.web.drive.control_service import ControlService, OperatorSession
 from urc.web.feed.client_socket import ClientSocket, FlowControl, TokenBucket
@@ -65,10 +66,10 @@ class RedundantSocket:
         except WebSocketDisconnect:
             pass
 
-    def heartbeat(self, number: int) -> None:
+    def heartbeat(self, number: int, link: LinkState | None) -> None:
         """Send a heartbeat number, unless an earlier number is still unsent."""
         if self._flow.is_free():
-            self._flow.write(as_frame(wire.encode_beat(number).encode(), is_text=True))
+            self._flow.write(as_frame(wire.encode_beat(number, link).encode(), is_text=True))
 
     def end(self) -> None:
         """Close the socket after its page has closed or opened a newer redundant socket."""

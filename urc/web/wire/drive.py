@@ -8,6 +8,7 @@ import msgspec
 from urc.model.role import includes
 from urc.motion.hold_to_run import Reason
 from urc.motion.lease import LeaseState, Operator
+from urc.motion.link_age import LinkState
 from urc.web.wire.text import cut, encoded, milliseconds
 from urc.wire.client_messages import (
     Doubled,
@@ -21,6 +22,7 @@ from urc.wire.client_messages import (
 )
 from urc.wire.server_messages import (
     HeartbeatMessage,
+    InputRow,
     LeaseMessage,
     OperatorRow,
     RefusedMessage,
@@ -98,9 +100,15 @@ def encode_lease(
     )
 
 
-def encode_beat(number: int) -> str:
-    """Return the message with a heartbeat number, which the page must echo."""
-    return encoded(HeartbeatMessage(number))
+def encode_beat(number: int, link: LinkState | None = None) -> str:
+    """Return the message with a heartbeat number, which the page must echo.
+
+    `link` is the state of a link from another site; None for a page of this site.
+    """
+    if link is None:
+        return encoded(HeartbeatMessage(number))
+    row = InputRow(milliseconds(link.age_s), round(100 * link.share))
+    return encoded(HeartbeatMessage(number, row))
 
 
 def encode_stopped(command: str, reason: Reason) -> str:

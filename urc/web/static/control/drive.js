@@ -57,7 +57,13 @@ export class Drive {
     this.beatMs = 0;
     /** Time of the last late heartbeat, on this page's clock. */
     this.lateMs = -Infinity;
-    this.spare = new RedundantSocket(spareUrl, (message) => this.hear(message.n, performance.now()));
+    /**
+     * The newest tick as the robot's site received it; null at the robot's own site.
+     *
+     * @type {{age: number, percent: number} | null}
+     */
+    this.input = null;
+    this.spare = new RedundantSocket(spareUrl, ({ n, input }) => this.hear(n, performance.now(), input));
     /** Time of the last tick that left the buffer empty. */
     this.freeMs = -Infinity;
     /** Counter of messages about held controls. */
@@ -103,7 +109,7 @@ export class Drive {
     this.lease = lease;
     this.handedMs = nowMs + lease.left;
     this.overrideMs = this.isMine ? nowMs + (lease.override ?? 0) : 0;
-    if (!this.isMine) this.beat = this.beatMs = 0;
+    if (!this.isMine) this.forgetBeat();
     if (this.isMine !== wasMine || lease.latched) this.refusal = "";
     // A latch from before the press is no answer to it.
     const isAnswered = Boolean(lease.latched) && (this.pressed === null || lease.stops !== this.pressed);
@@ -132,13 +138,21 @@ export class Drive {
    *
    * @param {number} beat
    * @param {number} nowMs
+   * @param {{age: number, percent: number} | null} [input] this page's newest tick
    */
-  hear(beat, nowMs) {
+  hear(beat, nowMs, input = null) {
     if (!this.isMine || beat <= this.beat) return;
     if (this.beat && nowMs - this.beatMs > LATE_BEAT_MS) this.lateMs = nowMs;
     this.beat = beat;
     this.beatMs = nowMs;
+    this.input = input;
     this.double();
+  }
+
+  /** Forget the heartbeats of an earlier lease. */
+  forgetBeat() {
+    this.beat = this.beatMs = 0;
+    this.input = null;
   }
 
   /** Whether the link to the server has recently lost or delayed data. */
@@ -184,7 +198,8 @@ export class Drive {
       this.posted = { latched: this.lease.latched, confirmed: this.lease.confirmed };
     }
     this.lease = null;
-    this.beat = this.beatMs = this.overrideMs = 0;
+    this.forgetBeat();
+    this.overrideMs = 0;
     this.double();
     this.changed();
   }

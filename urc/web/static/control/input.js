@@ -435,11 +435,17 @@ export class Input {
    * @param {Control} control
    */
   slowNote({ phase, sight }) {
-    if (phase !== "held" || !sight) return "";
+    if (phase !== "held") return "";
     const nowMs = performance.now();
-    const share = this.images.share(sight, nowMs);
-    if (this.drive.overrideMs > nowMs) return share === 0 ? t("Driving without an image") : "";
-    return share === 1 ? "" : t("Old image: {percent} % of the speed", { percent: Math.round(10 * share) * 10 });
+    const isOverridden = this.drive.overrideMs > nowMs;
+    const seen = sight ? this.images.share(sight, nowMs) : 1;
+    if (isOverridden && seen === 0) return t("Driving without an image");
+    const image = isOverridden ? 1 : seen;
+    const link = (this.drive.input?.percent ?? 100) / 100;
+    const share = Math.min(image, link);
+    if (share === 1) return "";
+    const percent = Math.round(10 * share) * 10;
+    return link < image ? t("Slow link: {percent} % of the speed", { percent }) : t("Old image: {percent} % of the speed", { percent });
   }
 
   /** @param {HeldControl} grip */

@@ -312,9 +312,10 @@
  *   first.
  * @property {{limited: number, known: number}} watched Number of signals with a limit, and of those with
  *   a recent value.
- * @property {{isUp: boolean, tripMs: number | null, failures: number, skewMs: number | null, messages: number, bytes: number}} latency
+ * @property {{isUp: boolean, tripMs: number | null, failures: number, skewMs: number | null, messages: number, bytes: number, inputMs?: number | null}} latency
  *   Round trip to URC, and lead of this device's clock over URC's, null while unknown; also the traffic
- *   since the opening of the page.
+ *   since the opening of the page, and the age of its newest tick at the robot's site, if this is
+ *   another site.
  * @property {Readonly<Record<string, Progress>>} sequences State of each sequence by its name, without
  *   sequences that never ran.
  * @property {{isKnown: boolean, goals: readonly Goal[]}} goals Autonomous motion by the commands of

@@ -39,6 +39,7 @@ const SENTENCES = [
   mark("Control changed hands meanwhile"),
   mark("No current image of the camera"),
   mark("Image too old: let go, then start again"),
+  mark("Slow link: let go, then start again"),
   mark("no command of this robot requires an image"),
   mark("Stopped: let go, then start again"),
   mark("Stopped: take control again"),

@@ -118,7 +118,7 @@ const follows = new PageTopics(
     watched: () => watched(store, performance.now()),
     latency: () => {
       const { isUp, tripMs, failures, skewMs, messages, bytes } = socket;
-      const value = { isUp, tripMs, failures, skewMs, messages, bytes };
+      const value = { isUp, tripMs, failures, skewMs, messages, bytes, inputMs: drive.input?.age ?? null };
       return { look: JSON.stringify(value), value };
     },
     sequences: () => ({ look: JSON.stringify(sequences), value: sequences }),
@@ -305,7 +305,7 @@ function take(message) {
       input.leaseChanged();
       break;
     case "beat":
-      drive.hear(message.n, nowMs);
+      drive.hear(message.n, nowMs, message.input);
       return; // nothing to draw
     case "stopped":
       input.stopped(
