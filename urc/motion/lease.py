@@ -5,6 +5,10 @@ sends a stop to the robot and increments the lease's epoch. Inputs with an older
 so no motion continues under an earlier lease. A holder who sends no input for `SILENT_S` seconds
 loses the lease. STOP does not require a lease, and it latches: the robot does not move until an
 operator resets the latch. A reset never starts motion.
+
+The lease and the latch exist only at the robot's site. Operators of other sites have the rights of
+their role, and leave when the connection between the sites ends. Delayed requests then have no
+effect.
 """
 
 from typing import Final, NamedTuple
@@ -59,8 +63,8 @@ class LeaseState(NamedTuple):
     latched_by: str = ""
     """Name of the operator who pressed STOP; "" if no stop is latched."""
     stops: int = 0
-    """Number of STOPs since the server started. A request made before the last STOP is invalid,
-    even after a reset."""
+    """Number of STOPs so far, which a restart preserves. A request made before the last STOP is
+    invalid, even after a reset."""
 
 
 class LeaseChanged(NamedTuple):
@@ -205,12 +209,15 @@ class Lease:
         """Reset the latch, so that operators can drive the robot again.
 
         A reset neither starts motion nor undoes a newer STOP. `stops` is the number of STOPs known
-        to `client`; None stands for the current number.
+        to `client`; None stands for the current number. A client of another site must name it,
+        because its reset may be late.
         """
         if not includes(client.role, "drive"):
             return LeaseRefused("watchers can stop the robot, but cannot reset it")
         if not self.state.latched_by:
             return LeaseRefused("nothing is stopped")
+        if stops is None and client.way == "site":
+            return LeaseRefused("A reset from another site must contain the number of STOPs")
         if stops is not None and stops != self.state.stops:
             return LeaseRefused("STOP was pressed again: reset it again")
         self.state = self._next()

@@ -125,7 +125,7 @@ def _check_base(file: Path) -> None:
 
 
 def _merge_latches(new: Path, old: Path) -> None:
-    """Latch each STOP that is latched in either folder, and keep the higher epoch of each lease."""
+    """Latch each STOP that is latched in either folder, and keep the higher counters."""
     for kept in old.rglob("*.latch.json"):
         restored = new / kept.relative_to(old)
         now, then = _latch(kept), _latch(restored)
@@ -133,7 +133,10 @@ def _merge_latches(new: Path, old: Path) -> None:
             make_private(restored.parent)
             put_private(restored, kept.read_bytes()[:_LATCH_BYTES])
         else:
-            merged = {**then, "epoch": max(now["epoch"], then["epoch"])}
+            counters = {"epoch": max(now["epoch"], then["epoch"])}
+            if "stops" in now or "stops" in then:
+                counters["stops"] = max(_stops(now), _stops(then))
+            merged = {**then, **counters}
             put_private(restored, json.dumps(merged).encode())
 
 
@@ -159,6 +162,12 @@ def _latch(file: Path) -> dict[str, Any] | None:
     except (OSError, ValueError, TypeError, KeyError):
         return None
     return found if is_latch else None
+
+
+def _stops(latch: dict[str, Any]) -> int:
+    """Return the number of STOPs in a latch file; 0 if it is missing or damaged."""
+    found = latch.get("stops", 0)
+    return found if type(found) is int else 0
 
 
 def _swap(new: Path, old: Path, data: Path) -> None:

@@ -1,4 +1,4 @@
-"""A small file for the parts of a lease that survive a restart: latch, epoch and pending stop.
+"""A small file for the parts of a lease that survive a restart: latch, counters and pending stop.
 
 Writing the file can be slow, and fails on a full disk. A stop must not wait for the file. A thread
 therefore writes the newest state, and failures are reported without an exception.
@@ -65,7 +65,10 @@ class LatchStore:
                 found = json.loads(file.read(_MOST_BYTES))
             epoch, by = found["epoch"], found["latched_by"]
             if type(epoch) is int and epoch >= 0 and type(by) is str:
-                state = LeaseState(epoch=epoch, latched_by=_of_before(by[:_LONGEST_NAME]))
+                # An earlier reset must not undo a STOP of this run that has the same number.
+                stops = found.get("stops", 0)
+                stops = stops if type(stops) is int and stops >= 0 else 0
+                state = LeaseState(epoch, latched_by=_of_before(by[:_LONGEST_NAME]), stops=stops)
                 return Latch(state, found.get("owed", by != "") is not False)
         except FileNotFoundError:
             return Latch(LeaseState())
@@ -116,8 +119,9 @@ class LatchStore:
     def _replace(self, kept: Latch) -> None:
         """Replace the file atomically, so that a crash leaves either the old or the new content."""
         by = kept.state.latched_by[:_LONGEST_NAME]
-        text = json.dumps({"epoch": kept.state.epoch, "latched_by": by, "owed": kept.is_owed})
-        put_private(self._file, text.encode())
+        epoch, stops = kept.state.epoch, kept.state.stops
+        found = {"epoch": epoch, "latched_by": by, "owed": kept.is_owed, "stops": stops}
+        put_private(self._file, json.dumps(found).encode())
 
 
 def _of_before(by: str) -> str:

@@ -299,3 +299,14 @@ def test_reset_that_was_sent_before_a_newer_stop_does_not_undo_it() -> None:
     assert refused == LeaseRefused("STOP was pressed again: reset it again")
     assert lease.state.latched_by == "ann"
     assert isinstance(lease.reset(Operator("ann", "ann", "drive"), seen + 1), LeaseChanged)
+
+
+def test_reset_from_another_site_names_the_stops_that_it_undoes() -> None:
+    """It may have been on its way for a while, so it never undoes what its sender did not see."""
+    lease = Lease()
+    lease.stop("ann")
+    far = Operator("far", "far", "drive", way="site")
+    refused = lease.reset(far)
+    assert refused == LeaseRefused("A reset from another site must contain the number of STOPs")
+    assert lease.state.latched_by == "ann"
+    assert isinstance(lease.reset(far, lease.state.stops), LeaseChanged)

@@ -196,6 +196,17 @@ def test_a_stopped_robot_stays_stopped(data: Path, tmp_path: Path) -> None:
     assert json.loads(found["emulated/cart.latch.json"])["epoch"] == 92
 
 
+def test_the_higher_number_of_stops_is_kept(data: Path, tmp_path: Path) -> None:
+    """So that a reset from before the restore undoes no later STOP."""
+    file, cart = tmp_path / "backup.zip", data / "latches" / "cart.latch.json"
+    numbered = json.loads(latch("Ann")) | {"stops": 2}
+    cart.write_text(json.dumps(numbered))
+    write_backup(data, file, MADE)
+    cart.write_text(json.dumps(numbered | {"latched_by": "", "stops": 5}))
+    restored(file, data, replaces=True)
+    assert json.loads(cart.read_text()) == numbered | {"stops": 5}
+
+
 def test_a_replaced_audit_log_is_kept(data: Path, tmp_path: Path) -> None:
     file = tmp_path / "backup.zip"
     write_backup(data, file, MADE)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from urc.motion.lease import LeaseState, Operator
+from urc.motion.lease import Lease, LeaseChanged, LeaseRefused, LeaseState, Operator
 from urc.runtime.latch import Latch, LatchStore
 
 pytestmark = pytest.mark.anyio
@@ -25,6 +25,29 @@ async def test_what_was_kept_is_found_again(tmp_path: Path) -> None:
     found = LatchStore(tmp_path / "new" / "folder", "puppet").load()
     assert found == Latch(LeaseState(7, latched_by=f"ann{BEFORE}"))
     assert len(list((tmp_path / "new" / "folder").iterdir())) == 1, "no half file is left behind"
+
+
+async def test_the_number_of_stops_goes_on_after_a_restart(tmp_path: Path) -> None:
+    """A reset that names a STOP of an earlier run undoes none of this one."""
+    file = LatchStore(tmp_path, "puppet")
+    before = Lease()
+    before.stop("ann")
+    seen = before.state.stops
+    file.save(Latch(before.state))
+    await file.settle()
+    after = Lease(LatchStore(tmp_path, "puppet").load().state)
+    bob = Operator("b", "bob", "drive")
+    assert isinstance(after.reset(bob), LeaseChanged)
+    after.stop("eve")
+    assert isinstance(after.reset(bob, seen), LeaseRefused)
+    assert after.state.latched_by == "eve"
+
+
+@pytest.mark.parametrize("stops", ['"3"', "-1", "null", "true", "1.5"])
+def test_a_damaged_number_of_stops_does_not_hide_the_latch(tmp_path: Path, stops: str) -> None:
+    text = f'{{"epoch": 3, "latched_by": "ann", "stops": {stops}}}'
+    (tmp_path / "puppet.latch.json").write_text(text)
+    assert LatchStore(tmp_path, "puppet").load().state == LeaseState(3, latched_by=f"ann{BEFORE}")
 
 
 async def test_who_stopped_it_in_another_run_is_none_of_this_ones_screens(tmp_path: Path) -> None:
