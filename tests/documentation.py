@@ -62,7 +62,9 @@ def is_piece(block: Block) -> bool:
 
 BLOCKS = [block for page in PAGES for block in blocks(page)]
 YAML = [block for block in BLOCKS if block.language == "yaml"]
-DOCUMENTS = [block for block in YAML if block.text.startswith("urc: 1\n") and not is_piece(block)]
+RULES = [block for block in YAML if "\nkind: site-rules\n" in block.text]
+WHOLE = [block for block in YAML if block.text.startswith("urc: 1\n") and not is_piece(block)]
+DOCUMENTS = [block for block in WHOLE if block not in RULES]
 
 
 def answers() -> Iterator[tuple[list[str], Block]]:

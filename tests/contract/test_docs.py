@@ -11,10 +11,21 @@ from typing import Any
 import pytest
 import yaml
 
-from tests.documentation import BLOCKS, DOCUMENTS, ROOT, YAML, Block, answers, is_piece, write_files
+from tests.documentation import (
+    BLOCKS,
+    DOCUMENTS,
+    ROOT,
+    RULES,
+    YAML,
+    Block,
+    answers,
+    is_piece,
+    write_files,
+)
 from urc.cli.arguments import parse
 from urc.cli.main import VERBS, main, module_of
 from urc.config.load import WidgetFolder, check
+from urc.fleet.rules_file import read_rules
 from urc.model.values import AlarmLimits, Signal
 from urc.runtime.document_tests import exercise
 from urc.runtime.registries import built_in_catalog
@@ -78,8 +89,16 @@ def test_a_document_of_the_pages_is_without_a_finding(folder: Path, block: Block
         assert exercise(checked.profile).problems == []
 
 
+@pytest.mark.parametrize("block", RULES, ids=str)
+def test_the_rules_of_the_pages_are_correct(tmp_path: Path, block: Block) -> None:
+    """They are read as a site reads them."""
+    file = tmp_path / "rules.yaml"
+    file.write_text(block.text, "utf-8")
+    assert read_rules(file).rules
+
+
 @pytest.mark.parametrize(
-    "block", [one for one in YAML if one not in DOCUMENTS and not one.file], ids=str
+    "block", [one for one in YAML if one not in (*DOCUMENTS, *RULES) and not one.file], ids=str
 )
 def test_a_piece_is_part_of_the_whole_file(block: Block) -> None:
     """What a step of the page shows stands in the whole file, line for line."""

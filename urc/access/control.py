@@ -132,6 +132,17 @@ class AccessControl:
             self._merge()
         return who
 
+    def judge_visits(self, judged: Callable[[Visit], Visit]) -> list[Visit]:
+        """Replace each visit by `judged` of it; return the visits that have changed."""
+        changed = self._visits.judge(judged)
+        if changed:
+            self._merge()
+        return changed
+
+    def visit_limit(self, who: Identity, robot: str) -> str:
+        """Return why a visitor's role for a robot is lower than proposed; "" if it is not."""
+        return self._visits.limit(who.sign_in, robot) if who.way == "site" else ""
+
     def end_visits(self, site: str) -> None:
         """End all visits from a site, for example because its certificate was revoked."""
         if self._visits.end_site(site):

@@ -82,6 +82,8 @@ class Identity(NamedTuple):
     way: Way | Literal[""] = ""
     person: str = ""
     """Id of the device's owner, or of the principal itself if there is no owner."""
+    visit: str = ""
+    """Identifier of a visit from another site, in the audit logs of both sites; "" otherwise."""
 
 
 NOBODY: Final = Identity()

@@ -174,8 +174,10 @@ def _fleet(data: Path) -> Iterator[_Finding]:
     from urc.fleet.faults import membership_faults
     from urc.fleet.files import FLEET_FOLDER
     from urc.fleet.membership import Membership, NoMembership
+    from urc.fleet.rules import OPEN
+    from urc.fleet.rules_file import RULES_FILE, read_rules
 
-    faults = list(membership_faults(data / FLEET_FOLDER, datetime.now(UTC)))
+    faults = [*membership_faults(data / FLEET_FOLDER, datetime.now(UTC))]
     yield from (_Finding("fleet", False, fault) for fault in faults)
     if not faults:
         try:
@@ -185,6 +187,11 @@ def _fleet(data: Path) -> Iterator[_Finding]:
             return
         ends = f"{own.certificate.ends:%Y-%m-%d %H:%M} UTC"
         yield _Finding("fleet", True, f"site {own.site} of fleet {own.fleet}, until {ends}")
+        rules = read_rules(data / FLEET_FOLDER / RULES_FILE)
+        text = f"{len(rules.rules)} rules for visitors; see 'urc fleet rules'"
+        if rules is OPEN:
+            text = "visitors may drive if their site proposes it; see 'urc fleet rules'"
+        yield _Finding("fleet rules", True, text)
 
 
 def _load_robots() -> str:

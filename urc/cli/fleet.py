@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from urc.cli.audited import audit_access
 from urc.cli.error_report import Misuse
+from urc.cli.fleet_rules import fleet_rules
 from urc.cli.identities import add_actions, add_format, local_time, show, words_of
 from urc.cli.invitation_links import qr_lines
 from urc.cli.output import complain
@@ -31,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_actions(
         parser,
         _ACTIONS,
-        "status, init FLEET, invite SITE, join CODE|FILE, revoke SITE, or renew",
+        "status, init FLEET, invite SITE, join CODE|FILE, revoke SITE, renew, rules, or rules check"
+        " NAME@SITE ROBOT",
     )
     parser.add_argument("--site", metavar="SITE", help="init: name of the authority's site")
     parser.add_argument(
@@ -55,6 +57,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--qr", action="store_true", help="invite: also show the code as a QR code")
     parser.add_argument(
         "--replace", action="store_true", help="join: leave the fleet of this data folder"
+    )
+    parser.add_argument(
+        "--device",
+        metavar="ADDRESS",
+        default="",
+        help="rules check: network address of the visitor's device (default: unknown)",
+    )
+    parser.add_argument(
+        "--tag",
+        metavar="TAG",
+        action="append",
+        default=[],
+        help="rules check: tag of the robot; repeatable",
+    )
+    parser.add_argument(
+        "--guest", action="store_true", help="rules check: the visitor has not signed in"
     )
     add_format(parser)
 
@@ -264,4 +282,5 @@ _ACTIONS: dict[str, _Action] = {
     "join": _join,
     "revoke": _revoke,
     "renew": _renew,
+    "rules": fleet_rules,
 }

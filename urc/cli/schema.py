@@ -11,7 +11,7 @@ from urc.cli.error_report import Misuse
 from urc.shipped import shipped
 
 EXAMPLE = "urc schema robot > robot.schema.json"
-KINDS = ("robot", "driver", "interface", "widget")
+KINDS = ("robot", "driver", "interface", "widget", "site-rules")
 
 _OTHER = re.compile(r'"\$ref": *"([a-z-]+\.schema\.json)')
 

@@ -269,4 +269,4 @@ def _taken(lease: LeaseMessage) -> str:
         return f"stopped by {lease.latched}"
     if lease.holder is not None:
         return f"{lease.holder.name} has the controls"
-    return "the server has withdrawn the controls"
+    return lease.limit or "the server has withdrawn the controls"

@@ -5,6 +5,7 @@ The other site checks the assertion against the certificate that TLS has proven.
 than the assertion proposes. Assertions are JSON Web Tokens (RFC 7519), signed with ES256.
 """
 
+import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ _ALGORITHM: Final = "ES256"
 _MAX_BYTES: Final = 4096
 _TEXTS: Final = ("sub", "name", "kind", "sign_in", "robot", "role", "place")
 _LONGEST: Final = 200
+_VISIT: Final = re.compile(r"[A-Za-z0-9_-]{0,64}")
 
 
 class BadAssertion(UrcError):
@@ -48,6 +50,8 @@ class Assertion:
     """Role that the fleet proposes."""
     place: str = ""
     """Network address of the person at the site that asserts."""
+    visit: str = ""
+    """Identifier of the visit in the audit logs of both sites; "" from older versions of URC."""
 
 
 def sign_assertion(
@@ -75,6 +79,7 @@ def sign_assertion(
         "robot": assertion.robot,
         "role": assertion.role,
         "place": assertion.place,
+        "visit": assertion.visit,
         "iat": int(now),
         "exp": int(now + LASTS_S) + 1,
         "jti": secrets.token_urlsafe(12),
@@ -132,7 +137,10 @@ def _parsed(claims: Mapping[str, object]) -> Assertion:
     role = next((one for one in get_args(Role) if one == texts["role"]), None)
     if role is None or texts["kind"] not in ("person", "device", "program", "guest"):
         raise BadAssertion("the assertion has an unknown role or kind")
+    visit = claims.get("visit", "")
+    if not isinstance(visit, str) or not _VISIT.fullmatch(visit):
+        raise BadAssertion("the assertion has no valid 'visit'")
     return Assertion(
         texts["sub"], texts["name"], texts["kind"], texts["sign_in"], texts["robot"], role,
-        texts["place"],
+        texts["place"], visit,
     )  # fmt: skip

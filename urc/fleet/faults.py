@@ -15,8 +15,10 @@ from urc.fleet.certificates import CertificateRefused
 from urc.fleet.files import AUTHORITY_FOLDER
 from urc.fleet.membership import Membership, NoMembership
 from urc.fleet.names import FleetError
+from urc.fleet.rules_file import RULES_FILE, read_rules
+from urc.problems import ProblemsError, printable
 
-__all__ = ["membership_faults"]
+__all__ = ["membership_faults", "rules_faults"]
 
 _PACKAGES: Final = {"zenoh": "eclipse-zenoh", "joserfc": "joserfc"}
 """Packages of the extra `fleet`, by the name of their module."""
@@ -37,11 +39,22 @@ def membership_faults(folder: Path, now: datetime) -> Iterator[str]:
         yield str(error)
     else:
         yield from _certificate_faults(membership, now)
+        yield from rules_faults(folder / RULES_FILE)
     if FleetAuthority.is_in(folder / AUTHORITY_FOLDER):
         yield from _authority_faults(folder / AUTHORITY_FOLDER)
     for module, package in _PACKAGES.items():
         if find_spec(module) is None:
             yield missing("the fleet needs", package, "fleet")
+
+
+def rules_faults(file: Path) -> Iterator[str]:
+    """Yield a line for each mistake in a file of rules; nothing without a file."""
+    try:
+        read_rules(file)
+    except ProblemsError as error:
+        for problem in error.problems:
+            hint = f"; {problem.hint}" if problem.hint else ""
+            yield printable(f"{problem.headline}{hint}")
 
 
 def _certificate_faults(membership: Membership, now: datetime) -> Iterator[str]:

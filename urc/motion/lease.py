@@ -47,6 +47,8 @@ class Operator(NamedTuple):
     """Network address; "" for this machine."""
     kind: str = ""
     """Kind of the principal: ``person``, ``device``, ``program`` or ``guest``."""
+    limit: str = ""
+    """Why the role is limited, as one line; "" if it is not."""
 
 
 class LeaseState(NamedTuple):
@@ -124,7 +126,7 @@ class Lease:
         """
         state = self.state
         if not includes(client.role, "drive"):
-            return WATCHES
+            return client.limit or WATCHES
         if state.latched_by:
             return self.latched
         if stops is not None and stops != state.stops:

@@ -105,7 +105,8 @@ def role_refusal(client: Operator, needed: Role) -> str:
     """Return the reason why the role of `client` does not permit a command, or ""."""
     if includes(client.role, needed):
         return ""
-    return WATCHES if needed == "drive" else f"this command needs the role {needed}"
+    text = WATCHES if needed == "drive" else f"this command needs the role {needed}"
+    return client.limit or text
 
 
 class _Cancellation(NamedTuple):
@@ -171,7 +172,7 @@ class OneShotCommands:
         Any operator may pause or end a sequence.
         """
         if what in ("pause", "abort"):
-            return "" if includes(client.role, "drive") else WATCHES
+            return role_refusal(client, "drive")
         return self.refusal(client, sequence)
 
     # -- session

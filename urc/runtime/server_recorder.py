@@ -146,6 +146,20 @@ class ServerRecorder:
         """Record that a pairing code was made or used; `about` never contains the code."""
         self._record("pairing", actor, step, arguments=about)
 
+    # Fleets
+
+    def visited(self, actor: Actor, robot: str, site: str, visit: str, outcome: str) -> None:
+        """Record the begin, a changed role or the refusal of a visit; identical ones are counted.
+
+        Args:
+            actor: the visitor, with the role at this site.
+            robot: name of the robot.
+            site: the other site.
+            visit: identifier of the visit in the audit logs of both sites.
+            outcome: result as text for display.
+        """
+        self._repeat(_Repeated("visit", actor._replace(sign_in=visit), robot, site, outcome))
+
     # Administration
 
     def access_changed(self, actor: Actor, command: str, **about: object) -> None:

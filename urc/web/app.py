@@ -186,7 +186,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
         network=options.network,
     )
     if options.network is not None:
-        access.site_visitor = options.network.visit
+        options.network.attach(access, recorder)
         routes.robot_calls.far = options.network.watch.summaries
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)

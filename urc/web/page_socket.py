@@ -27,6 +27,7 @@ from urc.web.fleet.robots import LiveSession, RobotService, SessionFailed, missi
 from urc.web.wire import messages as wire
 from urc.web.wire.ask import Approval, ApprovalRequest, SequenceAction, encode_token
 from urc.web.wire.drive import Drive, Driving, Release, Stop, Tick
+from urc.web.wire.text import close_reason
 from urc.wire.client_messages import GoalDismissal, ImageSelection, Reconnect, ScreenName
 
 __all__ = ["TokenBucket", "BrowserClient", "FlowControl", "SocketPeer", "ClientSocket"]
@@ -109,7 +110,7 @@ class BrowserClient:
         if self._operator is not None:
             self._service.controls.recheck(self._operator)
         if self._peer.rights.role() is None and not self._closing:
-            self._close(wire.CLOSE_NOT_LET_IN, SIGNED_OUT)
+            self._close(wire.CLOSE_NOT_LET_IN, self._peer.rights.limit() or SIGNED_OUT)
 
     async def _visit(self) -> None:
         controls = self._service.controls
@@ -191,7 +192,7 @@ class BrowserClient:
     async def _refuse(self, code: int, reason: str) -> None:
         try:
             await self._line.send_text(wire.encode_error("refused", reason))
-            await self._line.close(code, reason[:100])
+            await self._line.close(code, close_reason(reason))
         except WebSocketDisconnect:
             pass
 
@@ -233,7 +234,8 @@ class BrowserClient:
             if live.ended.is_set() and not self._closing:
                 self._closing = (wire.CLOSE_FAILED, "the robot's session ended")
             if self._closing:
-                await self._line.close(*self._closing)
+                code, reason = self._closing
+                await self._line.close(code, close_reason(reason))
                 return
             await self._news.wait()
 

@@ -250,6 +250,8 @@ class LeaseMessage(Outbound, tag="lease", omit_defaults=False, frozen=True):
     """The page's role for the robot; None if the page has no rights."""
     override: int = 0
     """Time for which the holder may still drive without an image, in milliseconds."""
+    limit: str = ""
+    """Why the robot's site limits the role of a visitor from another site; "" if it does not."""
 
 
 class InputRow(msgspec.Struct, frozen=True):

@@ -81,6 +81,10 @@ class _Rights:
         """Return whether the scope contains a command."""
         return not self.scope or command in self.scope
 
+    def limit(self) -> str:
+        """Return "" for no limit."""
+        return ""
+
     def permit(self, command: str) -> bool:
         """Return whether a command may reach the robot now, as the model says."""
         return includes(self.now, NEEDS.get(command, "drive")) and self.may_give(command)

@@ -15,14 +15,15 @@ from websockets.asyncio.client import ClientConnection, connect
 from tests.e2e.transports.certificates import Authority, Pair
 from urc.access.control import AccessControl
 from urc.access.store import AccessStore
+from urc.fleet.rules_file import RULES_FILE
 from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
 from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.serve.access import Access
 from urc.web.serve.site_peer import SitePeer, site_of
-from urc.web.sites.site_network import SiteNetwork, SitePolicy
+from urc.web.sites.site_network import SiteNetwork
 
-__all__ = ["Keys", "Place", "keys_of", "message", "place"]
+__all__ = ["Keys", "Place", "keys_of", "message", "place", "write_rules"]
 
 WAIT_S = 20.0
 
@@ -65,6 +66,12 @@ def keys_of(authority: Authority, site: str, folder: Path, age_days: int = 0) ->
     """Return certificates for a site, in a new folder."""
     (folder / site).mkdir(parents=True, exist_ok=True)
     return Keys(site, folder / site, authority.file, authority.sign(site, age_days))
+
+
+def write_rules(folder: Path, text: str) -> None:
+    """Write a site's rules for visitors, without the first two keys."""
+    content = f"urc: 1\nkind: site-rules\n{text}\n"
+    (folder / RULES_FILE).write_text(content, encoding="utf-8")
 
 
 class Place:
@@ -116,13 +123,23 @@ async def place(
     net: FakeFleetNetwork,
     keys: Keys,
     *robots: FakeRobot,
-    policy: SitePolicy = SitePolicy(),  # noqa: B008 - immutable
+    rules: str = "",
     claims: str = "",
 ) -> AsyncIterator[Place]:
-    """Run a site; with `claims`, its bus has another name than its certificate."""
+    """Run a site.
+
+    Args:
+        net: the network.
+        keys: certificates of the site.
+        robots: robots of the site.
+        rules: rules for visitors, without the first two keys; "" for no file.
+        claims: name of the site on the network; "" for the name in its certificate.
+    """
+    if rules:
+        write_rules(keys.folder, rules)
     store = AccessStore(keys.folder / "people")
     access = Access(AccessControl(store))
-    network = SiteNetwork(keys, net.bus(claims or keys.site), policy=policy)
+    network = SiteNetwork(keys, net.bus(claims or keys.site))
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
         DashboardOptions(access=access, linger_s=0.2, network=network),

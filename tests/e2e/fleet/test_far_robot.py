@@ -9,7 +9,7 @@ import pytest
 
 import urc.client
 from tests.e2e.dashboards import until
-from tests.e2e.fleet.places import Place, keys_of, message, place
+from tests.e2e.fleet.places import Place, keys_of, message, place, write_rules
 from tests.e2e.transports.certificates import Authority
 from urc.access.grants import Grant
 from urc.client.remote import RemoteRobot
@@ -19,7 +19,6 @@ from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
 from urc.testing.movers import FakeMotionBackend
-from urc.web.sites.site_network import SitePolicy
 
 pytestmark = pytest.mark.anyio
 
@@ -56,14 +55,14 @@ class Fleet:
 @asynccontextmanager
 async def open_fleet(
     folder: Path,
-    policy: SitePolicy = SitePolicy(),  # noqa: B008 - immutable
+    rules: str = "",
 ) -> AsyncIterator[Fleet]:
-    """Run both sites."""
+    """Run both sites; bern has these rules for visitors."""
     authority, network = Authority(folder), FakeFleetNetwork()
     robot = FakeRobot(open_document(shipped("robots") / "turtlebot4.yaml"))
     async with AsyncExitStack() as stack:
         bern = await stack.enter_async_context(
-            place(network, keys_of(authority, "bern", folder), robot, policy=policy)
+            place(network, keys_of(authority, "bern", folder), robot, rules=rules)
         )
         zug = await stack.enter_async_context(place(network, keys_of(authority, "zug", folder)))
         yield Fleet(authority, network, bern, zug, robot)
@@ -165,9 +164,13 @@ async def test_a_site_that_cannot_be_reached_is_named(fleet: Fleet) -> None:
 
 async def test_the_site_grants_less_than_the_fleet_proposes(tmp_path: Path) -> None:
     """Bern lets visitors watch; a command from zug is refused there."""
-    async with open_fleet(tmp_path, policy=SitePolicy(role="watch")) as fleet:
+    async with open_fleet(tmp_path, rules="otherwise: watch") as fleet:
         status, said, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}/commands/dock", {})
-        assert (status, said["code"]) == (403, "forbidden")
+        assert (status, said["code"], said["message"]) == (
+            403,
+            "forbidden",
+            "no other rule applies, so the site bern lets this computer (zug) only watch",
+        )
         assert not fleet.robot.commands
         _, found, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}")
         assert found["robot"]["role"] == "watch"
@@ -190,14 +193,47 @@ async def test_a_token_for_some_commands_only_watches_other_sites(fleet: Fleet) 
 
 async def test_a_site_may_refuse_all_visitors(tmp_path: Path) -> None:
     """The reason reaches the visitor in one line; STOP still works."""
-    async with open_fleet(tmp_path, policy=SitePolicy(role=None)) as fleet:
+    async with open_fleet(tmp_path, rules="otherwise: none") as fleet:
         path = f"/api/v1/robots/{fleet.name}"
         status, said, _ = await fleet.zug.ask(path)
         assert (status, said["message"]) == (
             403,
-            "the site bern admits no visitors from the site zug",
+            "no other rule applies, so the site bern refuses this computer (zug)",
         )
         assert (await fleet.zug.ask(f"{path}/stop", {}))[0] == 200
+
+
+async def test_changed_rules_stop_the_robot_and_name_the_rule(tmp_path: Path) -> None:
+    """The driver becomes a watcher, and learns why; nothing moves after the next change."""
+    async with open_fleet(tmp_path, rules="otherwise: drive") as fleet:
+        backend = fleet.robot.backend
+        assert isinstance(backend, FakeMotionBackend)
+        async with fleet.client() as robot:
+            driving = asyncio.create_task(hold(robot, 30))
+            await until(lambda: len(backend.written) > 3)
+            rule = "{ name: visits, role: watch, sites: [zug] }"
+            write_rules(tmp_path / "bern", f"rules: [{rule}]\notherwise: drive")
+            began_s = asyncio.get_running_loop().time()
+            await until(lambda: backend.texts[-1] == "drive stop")
+            assert asyncio.get_running_loop().time() - began_s < 1.0
+            count = len(backend.written)
+            with pytest.raises(UrcError, match="the rule “visits” of the site bern"):
+                await driving
+            write_rules(tmp_path / "bern", "otherwise: drive")
+            await until(lambda: fleet.bern.network.rules.rules.otherwise == "drive")
+            await asyncio.sleep(0.5)
+            assert set(backend.texts[count:]) <= {"drive stop"}
+
+
+async def test_a_page_learns_which_rule_refuses_it(tmp_path: Path) -> None:
+    """Pages cannot read a refused handshake, so the socket is closed with the reason."""
+    async with open_fleet(tmp_path, rules="otherwise: none") as fleet:
+        async with fleet.zug.socket(f"/ws?robot={fleet.name}") as line:
+            said = await message(line, "error")
+        assert (said["code"], said["message"]) == (
+            "refused",
+            "no other rule applies, so the site bern refuses this computer (zug)",
+        )
 
 
 async def test_a_foreign_certificate_and_a_forged_name_get_nothing(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Two servers in processes of their own, with nothing in common but the network: Zenoh over TLS."""
 
 import asyncio
+import json
 import os
 import signal
 from collections.abc import AsyncIterator
@@ -86,6 +87,41 @@ async def test_a_revoked_site_is_refused_at_once(sites: TwoSites) -> None:
         502,
         "the site bern refuses the connection: the certificate of site zug is revoked",
     )
+
+
+async def test_changed_rules_end_a_visit_and_both_sites_record_it(sites: TwoSites) -> None:
+    """The robot stops within a second, and both audit logs have the same identifier."""
+    robot = await sites.far()
+    file = sites.bern.data / "fleet" / "rules.yaml"
+    head = "urc: 1\nkind: site-rules\n"
+    async with sites.bern.open(ROBOT) as beside:
+        driving = asyncio.create_task(hold(robot, 30.0))
+        await reaches(beside, least=FAST)
+        rule = "{ name: night, role: watch, sites: [zug] }"
+        file.write_text(f"{head}rules: [{rule}]\notherwise: drive\n", encoding="utf-8")
+        with pytest.raises(UrcError, match="the rule “night” of the site bern"):
+            await driving
+        await reaches(beside, most=SLOW)
+    file.write_text(f"{head}otherwise: everybody\n", encoding="utf-8")
+    path = f"/api/v1/robots/{ROBOT}@bern"
+    said = ""
+    async with asyncio.timeout(WAIT_S):
+        while "cannot be read" not in said:
+            _, found = await asyncio.to_thread(sites.zug.ask, path)
+            said = found.get("message", "")
+    assert said == "the rules of the site bern cannot be read, so it admits no visitors"
+    shown = await asyncio.to_thread(run, "doctor", "--data-dir", str(sites.bern.data))
+    assert f"{file}:3:12: error" in shown.stdout
+    logs = [await asyncio.to_thread(visits, one) for one in (sites.bern, sites.zug)]
+    assert {one["robot"] for one in logs[0]} == {ROBOT}
+    assert {one["robot"] for one in logs[1]} == {f"{ROBOT}@bern"}
+    assert {one["client"] for one in logs[0]} & {one["client"] for one in logs[1]}
+
+
+def visits(site: Site) -> list[dict[str, str]]:
+    """Return the entries about visits in a site's audit log."""
+    lines = site.command("audit", "--export", "-").splitlines()
+    return [one for one in map(json.loads, lines) if one.get("what") == "visit"]
 
 
 def signal_process(process: UrcProcess, number: signal.Signals) -> None:

@@ -80,3 +80,26 @@ def test_visits_end_and_are_bounded() -> None:
     assert visits.end(30.0)
     assert list(visits.sign_ins) == ["zug/s9"]
     assert not visits.end(40.0)
+
+
+def test_a_judgement_lowers_a_role_at_once_and_says_why() -> None:
+    """The robot's site may change its rules while somebody drives."""
+    control = AccessControl(utc=Clock())
+    ann = control.visit(ANN, LASTS_S)
+    control.visit(ANN._replace(robot="crane"), LASTS_S)
+    told: list[bool] = []
+    control.on_change.append(lambda: told.append(True))
+
+    def decide(visit: Visit) -> Visit:
+        if visit.robot == "crane":
+            return visit
+        return visit._replace(role=None, limit="the day is over")
+
+    (changed,) = control.judge_visits(decide)
+    assert (changed.robot, changed.role) == ("cart", None)
+    assert (control.role(ann, "cart"), control.role(ann, "crane")) == (None, "drive")
+    assert control.visit_limit(ann, "cart") == "the day is over"
+    assert control.visit_limit(ann, "crane") == ""
+    assert told == [True]
+    assert control.judge_visits(decide) == []
+    assert told == [True]

@@ -145,7 +145,8 @@ def test_schema_says_where_its_file_is(capsys: Output) -> None:
 def test_schema_of_nothing_is_wrong_use(capsys: Output) -> None:
     """The line says what there is."""
     assert main(["schema"]) == 2
-    expected = "urc schema: KIND is missing: expected one of robot, driver, interface, widget\n"
+    kinds = "robot, driver, interface, widget, site-rules"
+    expected = f"urc schema: KIND is missing: expected one of {kinds}\n"
     assert capsys.readouterr() == ("", expected)
 
 

@@ -164,6 +164,9 @@ async def test_motion_that_waits_is_not_started_once_its_sender_may_only_watch()
         def may_give(self, command: str) -> bool:
             return True
 
+        def limit(self) -> str:
+            return ""
+
     rights = Rights()
     async with queued() as (robot, service, _, _):
         line = FakeLine()

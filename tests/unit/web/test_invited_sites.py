@@ -9,7 +9,7 @@ from urc.access.visits import Visit
 from urc.fleet.assertion import SCHEME
 from urc.fleet.membership import Membership
 from urc.web.serve.access import Access
-from urc.web.serve.site_peer import SitePeer, site_of
+from urc.web.serve.site_peer import CERTIFICATE, SitePeer, site_of
 
 HEADERS = [(b"authorization", f"{SCHEME} text".encode())]
 
@@ -26,9 +26,14 @@ def test_nobody_acts_from_a_site_that_has_not_used_its_invitation(tmp_path: Path
     access.site_visitor = lambda peer, _: Visit(
         peer.name, "p1", "Ann", "person", "s1", "cart", "drive"
     )
-    visitor, refused = access.visitor_from(peer_of(invited), HEADERS)
+    visitor, refused = access.visitor_from(peer_of(invited), HEADERS, "/api/v1/robots")
     assert refused == "site hall must first renew the certificate of its invitation"
     assert visitor.role("cart") is None
-    visitor, refused = access.visitor_from(peer_of(place.renewed(invited)), HEADERS)
+    visitor, refused = access.visitor_from(peer_of(invited), HEADERS, CERTIFICATE)
+    assert refused == ""
+    assert visitor.role("cart") is None
+    visitor, refused = access.visitor_from(
+        peer_of(place.renewed(invited)), HEADERS, "/api/v1/robots"
+    )
     assert refused == ""
     assert visitor.role("cart") == "drive"

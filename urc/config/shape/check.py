@@ -14,7 +14,7 @@ from urc.config.spelling_suggestions import did_you_mean
 from urc.problems import Problem
 from urc.source import Document, Path
 
-__all__ = ["check_inline", "check_options", "check_shape", "check_source"]
+__all__ = ["check_file", "check_inline", "check_options", "check_shape", "check_source"]
 
 
 def check_shape(document: Document) -> list[Problem]:
@@ -22,6 +22,11 @@ def check_shape(document: Document) -> list[Problem]:
     kind = kind_of(document)
     if not kind:
         return [_without_kind(document)]
+    return check_file(document, f"{kind}.schema.json")
+
+
+def check_file(document: Document, file: str) -> list[Problem]:
+    """Return a problem for every difference between a document and the schema in `file`."""
     problems = [
         document.problem(
             path,
@@ -31,7 +36,6 @@ def check_shape(document: Document) -> list[Problem]:
         )
         for path, number in _not_finite(document.data, ())
     ]
-    file = f"{kind}.schema.json"
     if not shipped_check().is_valid(file, document.data):
         from urc.config.shape.report import report
 

@@ -170,8 +170,9 @@ class ControlService:
         name = f"screen {self._peers}{f' at {peer.place}' if peer.place else ''}"
         if peer.is_known and not peer.is_local:
             name = who.name
+        visit = f"/{who.visit}" if who.visit else ""
         client = Operator(
-            f"s{self._peers}",
+            f"s{self._peers}{visit}",
             name,
             peer.rights.role(),
             who=who.name,
@@ -180,6 +181,7 @@ class ControlService:
             way="key" if peer.is_local else who.way,
             place=peer.place,
             kind=who.kind,
+            limit=peer.rights.limit(),
         )
         operator = OperatorSession(client, wake, peer.rights)
         self.controller.join(operator.client)
@@ -219,7 +221,10 @@ class ControlService:
         role = operator.rights.role()
         if role == operator.client.role:
             return
-        operator.client = operator.client._replace(role=role)
+        limit = operator.rights.limit()
+        operator.client = operator.client._replace(role=role, limit=limit)
+        if limit:
+            operator.notice("tick", wire.encode_refused("tick", "", limit))
         for command, needed in self._roles.items():
             if not includes(role, needed):
                 operator.forget(command)

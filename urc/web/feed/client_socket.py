@@ -174,6 +174,9 @@ class PeerRights(Protocol):
     def may_give(self, command: str) -> bool:
         """Return whether the peer's token permits a command; "" stands for all commands."""
 
+    def limit(self) -> str:
+        """Return why the role is limited, as one line; "" if it is not."""
+
 
 class FixedRights(NamedTuple):
     """Constant rights, for sockets without access control."""
@@ -187,6 +190,10 @@ class FixedRights(NamedTuple):
     def may_give(self, command: str) -> bool:
         """Return True."""
         return True
+
+    def limit(self) -> str:
+        """Return "" for no limit."""
+        return ""
 
 
 class SocketPeer(NamedTuple):

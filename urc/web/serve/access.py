@@ -88,7 +88,8 @@ class Access:
         argument is the network address."""
         self.site_visitor: Callable[[SitePeer, str], Visit] = _no_visitors
         """Function that returns the visit in an assertion of another site. The arguments are the
-        site and the assertion. It raises `UrcError` for an assertion that does not count."""
+        site and the assertion. It raises `UrcError` for an assertion that does not count. A visit
+        without a role is refused."""
         self.clock_check: Callable[[], str] = _right_clock
         """Function that returns a warning about a wrong clock; "" for a correct clock. It may
         block."""
@@ -139,24 +140,27 @@ class Access:
         )
         return Visitor(self, self._seen(next((who for who in found if who != NOBODY), NOBODY)))
 
-    def visitor_from(self, peer: SitePeer, headers: _Headers) -> tuple[Visitor, str]:
-        """Return the visitor of a request from another site, and why its assertion is refused.
+    def visitor_from(self, peer: SitePeer, headers: _Headers, path: str) -> tuple[Visitor, str]:
+        """Return the visitor of a request from another site, and why the request is refused.
 
         Args:
             peer: the site, as proven by its certificate.
             headers: headers of the request, with names in lower case. Without an assertion, the
                 visitor is unknown and may only press STOP.
+            path: path of the request.
         """
+        if peer.is_invitation:  # nobody acts from there
+            return Visitor(self, NOBODY, is_program=True), peer.refusal(path)
         for name, value in headers:
             scheme, _, text = value.decode("latin-1").partition(" ")
             if name == b"authorization" and scheme.lower() == SCHEME.lower():
-                if refusal := peer.refusal():
-                    return Visitor(self, NOBODY, is_program=True), refusal
                 try:
                     visit = self.site_visitor(peer, text.strip())
                 except UrcError as fault:
                     return Visitor(self, NOBODY, is_program=True), str(fault)
                 who = self.control.visit(visit, LASTS_S)
+                if visit.role is None:
+                    return Visitor(self, NOBODY, is_program=True), visit.limit
                 return Visitor(self, who, is_program=True), ""
         return Visitor(self, NOBODY, is_program=True), ""
 
@@ -241,6 +245,10 @@ class Access:
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether a token permits a command; record the use of the token."""
         return self.control.directory.may_give(self._seen(who), command)
+
+    def limit(self, who: Identity, robot: str) -> str:
+        """Return why the role of `who` for a robot is limited, as one line; "" if it is not."""
+        return self.control.visit_limit(who, robot)
 
     def signed_in_s(self, who: Identity) -> float:
         """Return the time since `who` signed in, in seconds; infinite without a sign-in."""

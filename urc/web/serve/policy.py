@@ -20,6 +20,7 @@ from urc._addresses import unmapped
 from urc.web.serve.access import Access
 from urc.web.serve.connection_quota import ConnectionQuota, is_stop
 from urc.web.serve.replies import API, told
+from urc.web.serve.rights import turn_away
 
 __all__ = [
     "BODY_BYTES",
@@ -214,8 +215,9 @@ class Policy:
         state["nonce"] = nonce
         refused = ""
         if (peer := state.get("site")) is not None:
-            state["visitor"], refused = self._access.visitor_from(peer, scope["headers"])
-            refused = peer.refusal(scope["path"]) or refused
+            state["visitor"], refused = self._access.visitor_from(
+                peer, scope["headers"], scope["path"]
+            )
         else:
             state["visitor"] = self._access.visitor(
                 scope["headers"], is_secure=scope["scheme"] in ("https", "wss")
@@ -223,7 +225,9 @@ class Policy:
         answer = _Answer(scope, send, nonce)
         is_stopping = is_stop(scope.get("method", ""), scope["path"])
         refusal = (403, refused) if refused and not is_stopping else self._refusal(scope)
-        if refusal is not None:
+        if refused and scope["type"] == "websocket":
+            await turn_away(scope, receive, send, refused)
+        elif refusal is not None:
             await answer.refuse(*refusal)
         elif is_stopping:
             await self._app(scope, _limited(scope, receive), answer.send)

@@ -13,6 +13,7 @@ from starlette.types import Receive, Scope, Send
 
 from urc.model.role import Role
 from urc.web.wire.messages import CLOSE_NOT_LET_IN, encode_error
+from urc.web.wire.text import close_reason
 from urc.web.words import t
 from urc.wire.foxglove import chosen_subprotocol, encode_status
 
@@ -93,6 +94,9 @@ class RightHolder(Protocol):
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor currently has a right."""
 
+    def limit(self, robot: str) -> str:
+        """Return why this site limits the visitor's role for a robot; "" if it does not."""
+
     @property
     def is_fresh(self) -> bool:
         """Whether the visitor has signed in within the last `FRESH_S` seconds."""
@@ -115,7 +119,7 @@ class ProtectedRoute(Route):
     async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Call the endpoint; raise `HTTPException` 403 for visitors without the right."""
         if not _may(scope, self.right):
-            raise HTTPException(403, self.right.refusal)
+            raise HTTPException(403, _refusal(scope, self.right))
         if self.right.is_fresh and not scope["state"]["visitor"].is_fresh:
             raise HTTPException(403, stale_text())
         await super().handle(scope, receive, send)
@@ -133,7 +137,7 @@ class ProtectedSocket(WebSocketRoute):
         if _may(scope, self.right):
             await super().handle(scope, receive, send)
         else:
-            await turn_away(scope, receive, send, self.right.refusal)
+            await turn_away(scope, receive, send, _refusal(scope, self.right))
 
 
 def stale_text() -> str:
@@ -150,7 +154,8 @@ async def turn_away(scope: Scope, receive: Receive, send: Send, reason: str) -> 
     text = encode_status("error", reason).decode() if subprotocol else ""
     await send({"type": "websocket.accept", "subprotocol": subprotocol})
     await send({"type": "websocket.send", "text": text or encode_error("refused", reason)})
-    await send({"type": "websocket.close", "code": CLOSE_NOT_LET_IN, "reason": reason[:100]})
+    cut = close_reason(reason)
+    await send({"type": "websocket.close", "code": CLOSE_NOT_LET_IN, "reason": cut})
 
 
 def _may(scope: Scope, right: Right) -> bool:
@@ -161,3 +166,9 @@ def _may(scope: Scope, right: Right) -> bool:
     visitor: RightHolder = scope["state"]["visitor"]
     robot = scope["path_params"].get("name", "") if right.scope == "robot" else ""
     return visitor.may(right, robot)
+
+
+def _refusal(scope: Scope, right: Right) -> str:
+    """Return why a visitor lacks a right; a limit of this site is the better reason."""
+    visitor: RightHolder = scope["state"]["visitor"]
+    return visitor.limit(scope["path_params"].get("name", "")) or right.refusal

@@ -28,6 +28,9 @@ class VisitorRights(Protocol):
     def may_give(self, who: Identity, command: str) -> bool:
         """Return whether a token permits a command; "" stands for all commands."""
 
+    def limit(self, who: Identity, robot: str) -> str:
+        """Return why the role of `who` for a robot is limited, as one line; "" if it is not."""
+
     def signed_in_s(self, who: Identity) -> float:
         """Return the time since `who` signed in, in seconds."""
 
@@ -97,6 +100,10 @@ class Visitor:
         """Return whether the visitor's token permits a command."""
         return self._rights.may_give(self.identity, command)
 
+    def limit(self, robot: str) -> str:
+        """Return why this site limits a visitor's role for a robot; "" if it does not."""
+        return self._rights.limit(self.identity, robot)
+
     def may(self, right: Right, robot: str = "") -> bool:
         """Return whether the visitor currently has a right; `robot` names the robot, if any.
 
@@ -130,6 +137,10 @@ class _RobotRights:
     def may_give(self, command: str) -> bool:
         """Return whether the visitor's token permits a command."""
         return self._visitor.may_give(command)
+
+    def limit(self) -> str:
+        """Return why this site limits the role, as one line; "" if it does not."""
+        return self._visitor.limit(self._robot)
 
 
 def visitor_of(connection: HTTPConnection) -> Visitor:

@@ -9,6 +9,7 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Final, Protocol
 from urllib.parse import quote
 
@@ -23,6 +24,7 @@ from urc.web.serve.rights import WATCH, turn_away
 from urc.web.serve.visitor import Visitor
 from urc.web.sites.robot_names import FarName, far_query, far_target
 from urc.web.sites.site_client import SiteClient, SiteFailed, relayed
+from urc.web.sites.visit_log import VisitLog
 
 __all__ = ["Gateway", "SignsAssertions"]
 
@@ -63,6 +65,7 @@ class Gateway:
         client: SiteClient,
         signer: SignsAssertions,
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
+        begun: VisitLog,
     ) -> None:
         """Create the middleware.
 
@@ -72,11 +75,13 @@ class Gateway:
             signer: the membership of this site.
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.
+            begun: identifiers of visits, and the audit log of this site.
         """
         self._app = app
         self._client = client
         self._signer = signer
         self._followed = followed
+        self._begun = begun
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request to another site, or call the application."""
@@ -113,6 +118,8 @@ class Gateway:
             role=role,
             place=str(client[0]),
         )
+        visit = self._begun.sent(assertion, far, "key" if visitor.is_local else who.way)
+        assertion = replace(assertion, visit=visit)
         return b"authorization", f"{SCHEME} {self._signer.asserted(assertion, far.site)}".encode()
 
     # Requests

@@ -84,54 +84,32 @@ class SiteClient:
         Raises:
             SiteFailed: the site is absent, or one end refuses the other's certificate.
         """
-        ended = asyncio.get_running_loop().create_future()
-        holder: list[TlsConnection] = []
-
-        def on_end() -> None:
-            if not ended.done():
-                ended.set_result(None)
-
-        class Starting(asyncio.Protocol):
-            """The protocol of the line before TLS."""
-
-            def connection_made(_, transport: asyncio.BaseTransport) -> None:  # noqa: N805
-                tls = TlsConnection(
-                    cast("asyncio.Transport", transport),
-                    self._context_of(site),
-                    lambda: protocol,
-                    lambda: holder[0].continue_handshake(),
-                    on_end,
-                    hostname=site,
-                )
-                holder.append(tls)
-                cast("asyncio.Transport", transport).set_protocol(tls)
-
+        start = _Start(self._context_of(site), site, protocol)
         try:
-            line = self._lines.dial(site, lane, Starting())
-            holder[0].continue_handshake()
+            line = self._lines.dial(site, lane, start)
             async with asyncio.timeout(CONNECT_S):
-                await ended
+                await start.handshake()
         except SiteAbsent as fault:
             raise SiteFailed(str(fault)) from fault
         except TimeoutError:
-            holder[0].abort()
+            start.abort()
             raise SiteFailed(f"the site {site} has not answered within {CONNECT_S:g} s") from None
         except BaseException:
-            if holder:
-                holder[0].abort()
+            start.abort()
             raise
-        if not holder[0].is_ready:
-            why = holder[0].fault or line.reason or "it ended the connection"
+        tls = start.connection()
+        if not tls.is_ready:
+            why = tls.fault or line.reason or "it ended the connection"
             raise SiteFailed(f"no secure connection to the site {site}: {why}")
-        der = holder[0].get_extra_info("ssl_object").getpeercert(binary_form=True)
+        der = tls.get_extra_info("ssl_object").getpeercert(binary_form=True)
         try:
             refusal = self._peer(der or b"").refusal()
         except UrcError as error:
             refusal = str(error)
         if refusal:
-            holder[0].abort()
+            tls.abort()
             raise SiteFailed(f"no secure connection to the site {site}: {refusal}")
-        return holder[0]
+        return tls
 
     @asynccontextmanager
     async def request(
@@ -169,6 +147,45 @@ class SiteClient:
             raise SiteFailed(f"the site {site} sent an invalid response ({fault})") from fault
         finally:
             tls.abort()
+
+
+class _Start(asyncio.Protocol):
+    """The protocol of a line until its TLS handshake has ended."""
+
+    def __init__(self, context: ssl.SSLContext, site: str, protocol: asyncio.Protocol) -> None:
+        self._context = context
+        self._site = site
+        self._protocol = protocol
+        self._ended = asyncio.Event()
+        self._tls: TlsConnection | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        line = cast("asyncio.Transport", transport)
+        self._tls = TlsConnection(
+            line,
+            self._context,
+            lambda: self._protocol,
+            lambda: self.connection().continue_handshake(),
+            self._ended.set,
+            hostname=self._site,
+        )
+        line.set_protocol(self._tls)
+
+    def connection(self) -> TlsConnection:
+        """Return the TLS connection, which exists as soon as the line does."""
+        if self._tls is None:
+            raise RuntimeError("the line has not called `connection_made`")
+        return self._tls
+
+    async def handshake(self) -> None:
+        """Begin the handshake, and wait for its end."""
+        self.connection().continue_handshake()
+        await self._ended.wait()
+
+    def abort(self) -> None:
+        """End the connection, if there is one."""
+        if self._tls is not None:
+            self._tls.abort()
 
 
 async def _parts(

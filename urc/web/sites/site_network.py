@@ -8,9 +8,8 @@ import ssl
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, cast
+from typing import Final, Protocol, cast
 
 from starlette.types import ASGIApp
 
@@ -19,8 +18,9 @@ from urc.access.visits import Visit
 from urc.fleet.assertion import Assertion, sign_assertion, verified_assertion
 from urc.fleet.bus import FleetBus
 from urc.fleet.lines import Lines
-from urc.model.role import ROLES, Role
-from urc.problems import UrcError
+from urc.fleet.rules import Applicant
+from urc.fleet.rules_file import RULES_FILE, RulesFile
+from urc.runtime.server_recorder import ServerRecorder
 from urc.web.serve.access import Access
 from urc.web.serve.rights import ProtectedRoute
 from urc.web.serve.site_peer import SitePeer
@@ -30,8 +30,13 @@ from urc.web.sites.member import Member
 from urc.web.sites.member_routes import MemberRoutes
 from urc.web.sites.site_client import SiteClient
 from urc.web.sites.site_watch import SiteWatch
+from urc.web.sites.visit_log import VisitLog
 
-__all__ = ["SiteKeys", "SiteNetwork", "SitePolicy"]
+__all__ = ["SiteKeys", "SiteNetwork"]
+
+
+RULES_S: Final = 0.2
+"""Interval between two looks at the file of rules, in seconds."""
 
 
 class SiteKeys(Protocol):
@@ -58,22 +63,6 @@ class SiteKeys(Protocol):
         """Return the site of a certificate that TLS has proven; raise `UrcError` if revoked."""
 
 
-@dataclass(frozen=True, slots=True)
-class SitePolicy:
-    """The rights of visitors from other sites at this site."""
-
-    role: Role | None = "drive"
-    """Highest role; None refuses all visitors."""
-    sites: frozenset[str] | None = None
-    """Sites whose visitors are admitted; None admits all sites of the fleet."""
-
-    def granted(self, site: str, proposed: Role) -> Role | None:
-        """Return the role for a visitor of a site; None refuses the visitor."""
-        if self.role is None or (self.sites is not None and site not in self.sites):
-            return None
-        return min(self.role, proposed, key=ROLES.index)
-
-
 class SiteNetwork:
     """The fleet, as this server sees it."""
 
@@ -82,7 +71,6 @@ class SiteNetwork:
         keys: SiteKeys,
         bus: FleetBus,
         *,
-        policy: SitePolicy = SitePolicy(),
         member: Member | None = None,
         utc: Callable[[], float] = time.time,
     ) -> None:
@@ -91,13 +79,14 @@ class SiteNetwork:
         Args:
             keys: the membership of this site.
             bus: the network of the fleet.
-            policy: rights of visitors from other sites.
             member: the membership, for renewals and revocations; None for fixed certificates.
             utc: UTC time in seconds since 1970.
         """
         self._keys = keys
         self._bus = bus
-        self._policy = policy
+        self.rules = RulesFile(keys.folder / RULES_FILE)
+        """The rules for visitors from other sites."""
+        self._visits = VisitLog(utc)
         self._utc = utc
         self.member = member
         self.door = SiteDoor(keys.server_context, keys.peer)
@@ -131,27 +120,70 @@ class SiteNetwork:
 
         Raises:
             BadAssertion: the assertion does not count.
-            UrcError: this site admits no visitors from the other site.
         """
         said = verified_assertion(
             text, issuer=peer.name, audience=self.site, key_pem=peer.key_pem, now=self._utc()
         )
-        role = self._policy.granted(peer.name, said.role)
-        if role is None:
-            raise UrcError(f"the site {self.site} admits no visitors from the site {peer.name}")
         kind = cast("Kind", said.kind)
-        return Visit(
-            peer.name, said.principal, said.name, kind, said.sign_in, said.robot, role, said.place
+        visit = self._judged(
+            Visit(
+                *(peer.name, said.principal, said.name, kind, said.sign_in, said.robot),
+                role=None,
+                place=said.place,
+                proposed=said.role,
+                id=said.visit,
+            )
         )
+        self._visits.received(visit)
+        return visit
+
+    def _judged(self, visit: Visit) -> Visit:
+        """Return a visit with the role that the rules of this site grant now."""
+        tags = self._access.tags_of(visit.robot) if self._access is not None else ()
+        is_guest = visit.kind == "guest"
+        who = Applicant(visit.site, visit.name, is_guest, visit.place, visit.robot, tags)
+        found = self.rules.rules.decided(who, visit.proposed, self._utc(), self.site)
+        return visit._replace(role=found.role, limit=found.reason)
+
+    def attach(self, access: Access, recorder: ServerRecorder) -> None:
+        """Admit visitors to a server.
+
+        Args:
+            access: identities and rights of the server.
+            recorder: the server's audit log.
+        """
+        self._access = access
+        self._visits.recorder = recorder
+        access.site_visitor = self.visit
 
     def around(self, app: ASGIApp, access: Access) -> ASGIApp:
         """Return the application with robots of other sites."""
-        self._access = access
-        return Gateway(app, self.client, self, access.followed)
+        return Gateway(app, self.client, self, access.followed, self._visits)
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes about certificates for other sites."""
         return MemberRoutes(self.member).routes() if self.member is not None else []
+
+    async def _follow_rules(self) -> None:
+        """Judge all visits again after each change of the rules, and each minute.
+
+        Rules begin and end at full minutes.
+        """
+        minute = self._utc() // 60
+        while True:
+            await asyncio.sleep(RULES_S)
+            has_changed, before = self.rules.has_changed(), minute
+            if has_changed:
+                await asyncio.to_thread(self.rules.reread)
+            minute = self._utc() // 60
+            if has_changed or minute != before:
+                self.judge_visits()
+
+    def judge_visits(self) -> None:
+        """Grant all visitors the roles of the current rules; robots of refused drivers stop."""
+        if self._access is not None:
+            for visit in self._access.control.judge_visits(self._judged):
+                self._visits.received(visit)
 
     def _sites_changed(self, sites: frozenset[str]) -> None:
         self.watch.changed()
@@ -175,7 +207,7 @@ class SiteNetwork:
     async def running(self) -> AsyncIterator[None]:
         """Take part in the fleet while the context is open; raise `BusFailed` if impossible."""
         await self._bus.open()
-        tasks = [asyncio.create_task(self.watch.run())]
+        tasks = [asyncio.create_task(self.watch.run()), asyncio.create_task(self._follow_rules())]
         if self.member is not None:
             tasks.append(asyncio.create_task(self.member.keep(self.client)))
         try:

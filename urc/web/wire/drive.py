@@ -96,6 +96,7 @@ def encode_lease(
             spare=spare if includes(you.role, "drive") else "",
             role=you.role,
             override=milliseconds(override_s),
+            limit=you.limit,
         )
     )
 

@@ -7,6 +7,7 @@ import msgspec
 
 __all__ = [
     "TEXT_CHARACTERS",
+    "close_reason",
     "cut",
     "encoded",
     "encoded_bytes",
@@ -16,6 +17,8 @@ __all__ = [
 
 TEXT_CHARACTERS = 4096
 """Maximum length of a text value, in characters; longer text is cut and ends with an ellipsis."""
+CLOSE_BYTES = 123
+"""Maximum length of the reason in a WebSocket's close frame, in bytes."""
 
 _encode = msgspec.json.Encoder().encode
 
@@ -48,6 +51,11 @@ def repaired(tree: object) -> object:
 def cut(text: str) -> str:
     """Return text, cut to `TEXT_CHARACTERS` characters."""
     return text if len(text) <= TEXT_CHARACTERS else text[: TEXT_CHARACTERS - 1] + "…"
+
+
+def close_reason(text: str) -> str:
+    """Return the reason of a closed socket, cut to the bytes of a close frame (RFC 6455, 5.5)."""
+    return text.encode()[:CLOSE_BYTES].decode(errors="ignore")
 
 
 def milliseconds(seconds: float) -> int:

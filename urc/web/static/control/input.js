@@ -184,7 +184,7 @@ export class Input {
     const { lease, isMine } = this.drive;
     if (!lease) return t("no connection to URC");
     if (lease.latched) return this.stopReason();
-    if (!lease.drives) return t("this page only watches");
+    if (!lease.drives) return said(lease.limit ?? "") || t("this page only watches");
     if (lease.holder && !isMine) return t("{name} has the controls", { name: said(lease.holder.name) });
     return "";
   }
@@ -209,7 +209,8 @@ export class Input {
    */
   hindrance(moves = false) {
     if (moves) return this.against();
-    return this.drive.lease?.drives === false ? t("this page only watches") : "";
+    const { lease } = this.drive;
+    return lease?.drives === false ? said(lease.limit ?? "") || t("this page only watches") : "";
   }
 
   /**

@@ -41,6 +41,7 @@ const SIGNS = {
   alarm: mark("◆ alarm"),
   lost: mark("▲ lost"),
   pruned: mark("○ old entries"),
+  visit: mark("→ visit"),
   "signed in": mark("● signed in"),
   "sign-in failed": mark("▲ sign-in failed"),
   "signed out": mark("○ signed out"),

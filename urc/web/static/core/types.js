@@ -179,6 +179,7 @@
  * @property {string} spare Key for the redundant socket; "" if the page may not open one.
  * @property {Role | null} role Role of this page at the robot.
  * @property {number} [override] Time for which the holder may still drive without an image, in milliseconds.
+ * @property {string} [limit] Why the robot's site limits the page's role; "" if it does not.
  *
  * @typedef {"watch" | "drive" | "maintain" | "administer"} Role Rights at a robot; each role includes
  *   the rights of the previous roles.
