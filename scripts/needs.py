@@ -213,6 +213,12 @@ NEEDS = (
         purpose="a test of URC behind a third-party web server",
     ),
     Need(
+        name="prometheus",
+        executables=("prometheus",),
+        package="prometheus",
+        purpose="a test of metrics",
+    ),
+    Need(
         name="websocketd",
         executables=("websocketd",),
         package="websocketd",

@@ -38,6 +38,7 @@ from urc.web.app import DashboardOptions, Robot, build_app, serve
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import Glimpse
 from urc.web.foxglove.port import FoxglovePort
+from urc.web.metrics.metric_names import ReadingChoice, is_numeric
 from urc.web.people.ways_in import SignInOptions
 from urc.web.serve.access import Access
 from urc.web.serve.clock_check import clock_warning
@@ -95,6 +96,8 @@ class DashboardAddress:
     """Port for Foxglove viewers; None if they use the dashboard's port."""
     is_in_fleet: bool = False
     """Whether to join the fleet of the data folder's membership."""
+    metrics: Sequence[ReadingChoice] = ()
+    """Readings that ``/metrics`` contains."""
 
 
 def run_dashboard(
@@ -167,7 +170,7 @@ async def _serve(
             addresses = ready_addresses(url, place.host, access, certificates, place.tls, foxglove)
             announce(stack, data, addresses)
             on_ready(addresses)
-            _tell_dark_cameras(robots.values())
+            _tell_gaps(place, robots)
             _begin_heartbeats(stack, manager, addresses.url)
 
         factory = RobotFactory(robot_options)
@@ -226,6 +229,23 @@ def _warn_of_packages(robot: Robot) -> None:
         complain(f"urc: {robot.profile.name} cannot be opened: {text}")
 
 
+def _warn_of_metrics(choices: Iterable[ReadingChoice], robots: Mapping[str, Robot]) -> None:
+    """Print a line for each chosen reading that no robot has."""
+    for choice in choices:
+        if not any(
+            is_numeric(signal) and choice.covers(name, signal.name)
+            for name, robot in robots.items()
+            for signal in robot.profile.driver.signals.values()
+        ):
+            complain(f"urc serve: --metric {choice}: no robot has this numeric signal")
+
+
+def _tell_gaps(place: DashboardAddress, robots: Mapping[str, Robot]) -> None:
+    """Print what these robots cannot do; the lines follow the dashboard's address."""
+    _tell_dark_cameras(robots.values())
+    _warn_of_metrics(place.metrics, robots)
+
+
 def _tell_dark_cameras(robots: Iterable[Robot]) -> None:
     """Print one line for each extra without which some of the robots show no video.
 
@@ -256,6 +276,7 @@ def _options(place: DashboardAddress, data: Path) -> DashboardOptions:
         sign_in=place.sign_in,
         notifier=AlarmNotifier(place.notify) if place.notify is not None else None,
         network=_network(data) if place.is_in_fleet else None,
+        metrics=place.metrics,
     )
 
 

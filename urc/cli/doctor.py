@@ -41,6 +41,7 @@ EXTRAS = {
     "xxhash": ("zenoh", "ROS 2 over Zenoh"),
     "cbor2": ("cbor", "CBOR images from rosbridge"),
     "zeroconf": ("mdns", "discovery of announced robots by 'urc discover'"),
+    "prometheus-client": ("metrics", "metrics for Prometheus and other monitoring systems"),
     "mcap": ("record", "recordings of sessions"),
     "av": ("video", "cameras that send H.264 or H.265"),
     "aiortc": ("whep", "cameras behind a WebRTC server, with WHEP"),

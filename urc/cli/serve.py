@@ -19,11 +19,13 @@ from urc.cli.error_report import Misuse
 from urc.cli.fault_injection import add_faults
 from urc.cli.output import complain
 from urc.cli.tls_options import add_tls, tls_of
+from urc.problems import UrcError
 
 if TYPE_CHECKING:
     from urc.model.profile import Profile
     from urc.model.values import Value
     from urc.web.alarms.notify_options import NotifyOptions
+    from urc.web.metrics.metric_names import ReadingChoice
     from urc.web.people.ways_in import SignInOptions
 
 EXAMPLE = "urc serve puppet --set host=192.168.1.20"
@@ -64,13 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         " if this process hangs, robots are not stopped",
     )
     _add_alarms(parser)
-    parser.add_argument(
-        "--fleet",
-        dest="is_in_fleet",
-        action="store_true",
-        help="join the fleet of this data folder: its robots appear here, and these robots there;"
-        " see 'urc fleet'",
-    )
+    _add_others(parser)
     for flag, text in (
         ("--data-dir", "data folder for latched stops, audit log and settings"),
         (
@@ -142,12 +138,33 @@ def run(arguments: argparse.Namespace) -> int:
             notify=_notify(arguments),
             foxglove=arguments.foxglove,
             is_in_fleet=arguments.is_in_fleet,
+            metrics=_metrics(arguments),
         ),
         is_simulated=arguments.simulate,
         on_ready=print_entrance,
         given=given,
         is_dev=arguments.dev,
         faults=arguments.faults,
+    )
+
+
+def _add_others(parser: argparse.ArgumentParser) -> None:
+    """Declare the options for other servers: the fleet and metrics."""
+    parser.add_argument(
+        "--fleet",
+        dest="is_in_fleet",
+        action="store_true",
+        help="join the fleet of this data folder: its robots appear here, and these robots there;"
+        " see 'urc fleet'",
+    )
+    parser.add_argument(
+        "--metric",
+        dest="metrics",
+        metavar="ROBOT.SIGNAL",
+        action="append",
+        default=[],
+        help="add this reading to /metrics; * stands for all robots or all signals, as in"
+        " '*.battery'; repeatable",
     )
 
 
@@ -217,6 +234,25 @@ def _notify(arguments: argparse.Namespace) -> "NotifyOptions | None":
     from urc.web.alarms.notify_options import read_notify_options
 
     return read_notify_options(arguments.notify)
+
+
+def _metrics(arguments: argparse.Namespace) -> "list[ReadingChoice]":
+    """Return the readings for metrics.
+
+    Raises:
+        UrcError: an option has a wrong form, or the extra is not installed.
+    """
+    if not arguments.metrics:
+        return []
+    from urc.web.metrics.metric_names import reading_choice
+    from urc.web.metrics.routes import missing_package
+
+    if text := missing_package():
+        raise UrcError(text)
+    try:
+        return [reading_choice(one) for one in arguments.metrics]
+    except UrcError as fault:
+        raise Misuse(f"--metric: {fault}") from None
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ Layer 5. The module only combines the other modules. `build_app` takes the robot
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Collection, Mapping
+from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -62,6 +62,8 @@ from urc.web.manage.new_robot import NewRobotRoutes
 from urc.web.manage.playback_control import move_playback, playback_state
 from urc.web.manage.routes import ManageRoutes
 from urc.web.manage.settings_routes import SettingsRoutes
+from urc.web.metrics.metric_names import ReadingChoice
+from urc.web.metrics.routes import MetricRoutes
 from urc.web.page_socket import BrowserClient
 from urc.web.people.people_routes import PeopleRoutes
 from urc.web.people.proxy_middleware import ProxyMiddleware
@@ -142,6 +144,8 @@ class DashboardOptions:
     """Receiver of all robots' new alarms, which sends notifications; None to send none."""
     network: SiteNetwork | None = None
     """The fleet of this server; None for a server alone."""
+    metrics: Sequence[ReadingChoice] = ()
+    """Readings that ``/metrics`` contains."""
 
 
 _DEFAULT: Final = DashboardOptions()
@@ -184,6 +188,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
         data=data,
         trust=WidgetTrust.of(options.trusted),
         network=options.network,
+        metrics=_metrics(fleet, options),
     )
     if options.network is not None:
         options.network.attach(access, recorder)
@@ -193,6 +198,17 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     access.on_bad_token = partial(record_bad_token, recorder)
     routes.add_managers(options)
     return _Dashboard(routes, options)
+
+
+def _metrics(fleet: Fleet, options: DashboardOptions) -> MetricRoutes:
+    network = options.network
+    site = network.site if network is not None else ""
+
+    def sites() -> dict[str, bool]:
+        watch = network.watch if network is not None else None
+        return {name: watch.is_present(name) for name in watch.sites} if watch is not None else {}
+
+    return MetricRoutes(lambda: fleet.services, site, sites, options.metrics, __version__)
 
 
 def _unread(entry: AuditEntry) -> None:
@@ -237,6 +253,7 @@ class _Dashboard(Starlette):
                 *TrustPages(options.certificates).routes(),
                 *(routes.network.routes() if routes.network is not None else ()),
                 *SiteRoutes(lambda: routes.services, routes.contacts.times, __version__).routes(),
+                *routes.metrics.routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
@@ -275,6 +292,7 @@ class _Routes:
     contacts: ContactWatch
     alarm_calls: AlarmCalls
     ways_in: WaysIn
+    metrics: MetricRoutes
     alarms: AlarmStore | None = None
     notifier: AlarmNotifier | None = None
     audit: AuditLog | None = None
@@ -404,6 +422,7 @@ class _Routes:
                 self.robot_calls.sessions.close()
                 await self.recording_calls.close()
                 await self.contacts.close()
+                self.metrics.close()
                 for task in tasks:
                     task.cancel()
                 if self.manager is not None:

@@ -137,6 +137,8 @@ class Fanout:
         """The event loop while `run` is active."""
         self._broken: asyncio.Future[None] | None = None
         self._movers = frozenset(movers)
+        self.images_count = 0
+        """Number of images and video frames sent to all clients so far."""
         self._pictures = {name for name, signal in hub.signals.items() if is_picture(signal)}
         self.cache = ImageCache(hub, self._clock)
         self.videos = VideoFeed(hub, self._clock)
@@ -246,8 +248,10 @@ class Fanout:
             first, second = second, first
         frame = first(place)
         if frame is None:
-            return second(place)
-        place.is_videos_turn = not place.is_videos_turn
+            frame = second(place)
+        else:
+            place.is_videos_turn = not place.is_videos_turn
+        self.images_count += frame is not None
         return frame
 
     def _next_unit(self, place: Place) -> bytes | None:
