@@ -89,6 +89,7 @@ def test_a_fleet_from_its_start_to_a_revocation(office: Site, hall: Site) -> Non
         "fleet": "mill", "site": "hall", "authority": "office", "is_authority": False,
         "ends": f"{renewed.certificate.ends:%Y-%m-%dT%H:%M:%SZ}", "is_invitation": False,
         "listen": ["[::]:7447"], "connect": [ADDRESS], "revoked": 0, "problems": [],
+        "sites": [],
     }  # fmt: skip
     assert office.status()["is_authority"] is True
     header, row = hall("status").splitlines()

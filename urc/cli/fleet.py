@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from urc.cli.audited import audit_access
 from urc.cli.error_report import Misuse
 from urc.cli.fleet_rules import fleet_rules
+from urc.cli.fleet_sites import known_sites, show_sites
 from urc.cli.identities import add_actions, add_format, local_time, show, words_of
 from urc.cli.invitation_links import qr_lines
 from urc.cli.output import complain
@@ -206,6 +207,7 @@ def _status(data: Path, arguments: argparse.Namespace) -> int:
         "connect": connect,
         "revoked": revoked.count,
         "problems": faults,
+        "sites": (sites := known_sites(data)),
     }
     ends = local_time(own.certificate.ends.timestamp())
     table = [
@@ -216,6 +218,8 @@ def _status(data: Path, arguments: argparse.Namespace) -> int:
         ),
     ]
     show([row], table, arguments, "")
+    if sites and arguments.format == "text":
+        show_sites(sites, arguments)
     for fault in faults:
         complain(f"urc fleet: {fault}")
     return 0

@@ -52,6 +52,8 @@ class Assertion:
     """Network address of the person at the site that asserts."""
     visit: str = ""
     """Identifier of the visit in the audit logs of both sites; "" from older versions of URC."""
+    version: str = ""
+    """Version of URC at the site that asserts; "" from older versions of URC."""
 
 
 def sign_assertion(
@@ -80,6 +82,7 @@ def sign_assertion(
         "role": assertion.role,
         "place": assertion.place,
         "visit": assertion.visit,
+        "version": assertion.version,
         "iat": int(now),
         "exp": int(now + LASTS_S) + 1,
         "jti": secrets.token_urlsafe(12),
@@ -140,7 +143,10 @@ def _parsed(claims: Mapping[str, object]) -> Assertion:
     visit = claims.get("visit", "")
     if not isinstance(visit, str) or not _VISIT.fullmatch(visit):
         raise BadAssertion("the assertion has no valid 'visit'")
+    version = claims.get("version", "")
+    if not isinstance(version, str) or len(version) > _LONGEST:
+        raise BadAssertion("the assertion has no valid 'version'")
     return Assertion(
         texts["sub"], texts["name"], texts["kind"], texts["sign_in"], texts["robot"], role,
-        texts["place"], visit,
+        texts["place"], visit, version,
     )  # fmt: skip

@@ -193,6 +193,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     if options.network is not None:
         options.network.attach(access, recorder)
         routes.robot_calls.far = options.network.watch.summaries
+        routes.robot_calls.sites = options.network.watch.states
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)
     access.on_bad_token = partial(record_bad_token, recorder)
@@ -202,12 +203,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
 
 def _metrics(fleet: Fleet, options: DashboardOptions) -> MetricRoutes:
     network = options.network
-    site = network.site if network is not None else ""
-
-    def sites() -> dict[str, bool]:
-        watch = network.watch if network is not None else None
-        return {name: watch.is_present(name) for name in watch.sites} if watch is not None else {}
-
+    site, sites = (network.site, network.watch.presence) if network is not None else ("", dict)
     return MetricRoutes(lambda: fleet.services, site, sites, options.metrics, __version__)
 
 
@@ -221,7 +217,8 @@ class _Dashboard(Starlette):
     def __init__(self, routes: "_Routes", options: DashboardOptions) -> None:
         self._access = access = routes.access
         self._ways_in = routes.ways_in
-        self._network = routes.network
+        self._network = network = routes.network
+        version = network.version if network is not None else __version__
         self._people = people = routes.people_routes()
         self._allowed_hosts = frozenset(options.allowed_hosts)
         dev = routes.dev
@@ -252,7 +249,7 @@ class _Dashboard(Starlette):
                 *files.routes(),
                 *TrustPages(options.certificates).routes(),
                 *(routes.network.routes() if routes.network is not None else ()),
-                *SiteRoutes(lambda: routes.services, routes.contacts.times, __version__).routes(),
+                *SiteRoutes(lambda: routes.services, routes.contacts.times, version).routes(),
                 *routes.metrics.routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),

@@ -13,6 +13,7 @@ import urllib3
 from websockets.asyncio.client import ClientConnection, connect
 
 from tests.e2e.transports.certificates import Authority, Pair
+from urc import __version__
 from urc.access.control import AccessControl
 from urc.access.store import AccessStore
 from urc.fleet.rules_file import RULES_FILE
@@ -125,6 +126,7 @@ async def place(
     *robots: FakeRobot,
     rules: str = "",
     claims: str = "",
+    version: str = __version__,
 ) -> AsyncIterator[Place]:
     """Run a site.
 
@@ -134,12 +136,13 @@ async def place(
         robots: robots of the site.
         rules: rules for visitors, without the first two keys; "" for no file.
         claims: name of the site on the network; "" for the name in its certificate.
+        version: version of URC that the site states.
     """
     if rules:
         write_rules(keys.folder, rules)
     store = AccessStore(keys.folder / "people")
     access = Access(AccessControl(store))
-    network = SiteNetwork(keys, net.bus(claims or keys.site))
+    network = SiteNetwork(keys, net.bus(claims or keys.site), version=version)
     app = build_app(
         {robot.profile.name: Robot(robot.profile, {}, robot.open) for robot in robots},
         DashboardOptions(access=access, linger_s=0.2, network=network),

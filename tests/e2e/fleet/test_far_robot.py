@@ -11,6 +11,7 @@ import urc.client
 from tests.e2e.dashboards import until
 from tests.e2e.fleet.places import Place, keys_of, message, place, write_rules
 from tests.e2e.transports.certificates import Authority
+from urc import __version__
 from urc.access.grants import Grant
 from urc.client.remote import RemoteRobot
 from urc.problems import UrcError
@@ -56,15 +57,17 @@ class Fleet:
 async def open_fleet(
     folder: Path,
     rules: str = "",
+    versions: tuple[str, str] = (__version__, __version__),
 ) -> AsyncIterator[Fleet]:
-    """Run both sites; bern has these rules for visitors."""
+    """Run both sites; bern has these rules for visitors, and the first version."""
     authority, network = Authority(folder), FakeFleetNetwork()
+    sites = [keys_of(authority, one, folder) for one in ("bern", "zug")]
     robot = FakeRobot(open_document(shipped("robots") / "turtlebot4.yaml"))
     async with AsyncExitStack() as stack:
         bern = await stack.enter_async_context(
-            place(network, keys_of(authority, "bern", folder), robot, rules=rules)
+            place(network, sites[0], robot, rules=rules, version=versions[0])
         )
-        zug = await stack.enter_async_context(place(network, keys_of(authority, "zug", folder)))
+        zug = await stack.enter_async_context(place(network, sites[1], version=versions[1]))
         yield Fleet(authority, network, bern, zug, robot)
 
 
@@ -253,6 +256,43 @@ async def test_a_foreign_certificate_and_a_forged_name_get_nothing(tmp_path: Pat
         status, said, _ = await forged.ask(f"/api/v1/robots/{fleet.name}")
         assert status == 502
         assert not fleet.robot.opened
+
+
+@pytest.mark.parametrize("versions", [("0.3.0", "0.1.0"), ("0.1.9", "0.3.0"), ("1.0", "0.9.0")])
+async def test_versions_too_far_apart_are_refused_and_stop_is_not(
+    tmp_path: Path, versions: tuple[str, str]
+) -> None:
+    """One line says which site to update; the menu has it too."""
+    async with open_fleet(tmp_path, versions=versions) as fleet:
+        path, older = f"/api/v1/robots/{fleet.name}", "zug" if versions[0] > versions[1] else "bern"
+        for _ in range(2):  # the first answer may come from bern, later ones come from zug
+            status, said, _ = await fleet.zug.ask(path)
+            assert status in (403, 502)
+            assert said["message"].endswith(f"; update URC at the site {older}")
+            await fleet.listed()
+        assert not fleet.robot.opened
+        _, found, _ = await fleet.zug.ask("/api/v1/robots")
+        assert found["robots"][0]["state"] == "lost"
+        assert found["sites"] == [
+            {
+                "name": "bern",
+                "version": versions[0],
+                "present": True,
+                "fault": found["robots"][0]["detail"],
+            }
+        ]
+        assert (await fleet.zug.ask(f"/robots/{fleet.name}/"))[0] == 502
+        assert (await fleet.zug.ask(f"{path}/stop", {}))[0] == 200
+
+
+async def test_one_version_apart_works(tmp_path: Path) -> None:
+    """A fleet is updated site by site."""
+    async with open_fleet(tmp_path, versions=("0.2.0", "0.1.0")) as fleet:
+        await fleet.listed()
+        status, _, _ = await fleet.zug.ask(f"/api/v1/robots/{fleet.name}")
+        assert status == 200
+        _, found, _ = await fleet.zug.ask("/api/v1/robots")
+        assert [(one["version"], one["fault"]) for one in found["sites"]] == [("0.2.0", "")]
 
 
 async def test_a_hello_names_the_session_of_the_site(fleet: Fleet) -> None:

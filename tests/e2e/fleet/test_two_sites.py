@@ -6,12 +6,14 @@ import os
 import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.e2e.dashboards import until
 from tests.e2e.fleet.two_sites import FAST, ROBOT, SLOW, WAIT_S, TwoSites, reaches
 from tests.e2e.processes import UrcProcess
+from urc import __version__
 from urc.client.remote import RemoteRobot
 from urc.problems import UrcError
 
@@ -44,6 +46,10 @@ async def test_a_robot_is_driven_from_another_site(sites: TwoSites) -> None:
         await reaches(robot, least=FAST)
         await driving
         await reaches(robot, most=SLOW)
+        command = ("fleet", "status", "--format", "json")
+        shown = json.loads(await asyncio.to_thread(sites.zug.command, *command))
+        found = [(one["name"], one["version"], one["present"]) for one in shown["sites"]]
+        assert found == [("bern", __version__, True)]
         assert await robot.stop()
         async with sites.bern.open(ROBOT) as beside:
             await until(lambda: "(zug)" in beside.latched_by)
@@ -99,9 +105,12 @@ async def test_changed_rules_end_a_visit_and_both_sites_record_it(sites: TwoSite
         await reaches(beside, least=FAST)
         rule = "{ name: night, role: watch, sites: [zug] }"
         file.write_text(f"{head}rules: [{rule}]\notherwise: drive\n", encoding="utf-8")
-        with pytest.raises(UrcError, match="the rule “night” of the site bern"):
+        with pytest.raises(UrcError):
             await driving
         await reaches(beside, most=SLOW)
+        await until(lambda: refused_by(sites))
+        with pytest.raises(UrcError, match="the rule “night” of the site bern"):
+            await robot.command("dock")
     file.write_text(f"{head}otherwise: everybody\n", encoding="utf-8")
     path = f"/api/v1/robots/{ROBOT}@bern"
     said = ""
@@ -116,6 +125,13 @@ async def test_changed_rules_end_a_visit_and_both_sites_record_it(sites: TwoSite
     assert {one["robot"] for one in logs[0]} == {ROBOT}
     assert {one["robot"] for one in logs[1]} == {f"{ROBOT}@bern"}
     assert {one["client"] for one in logs[0]} & {one["client"] for one in logs[1]}
+
+
+def refused_by(sites: TwoSites) -> bool:
+    """Return whether bern lets the visitor only watch."""
+    _, found = sites.zug.ask(f"/api/v1/robots/{ROBOT}@bern")
+    robot: Any = found["robot"]
+    return bool(robot["role"] == "watch")
 
 
 def visits(site: Site) -> list[dict[str, str]]:

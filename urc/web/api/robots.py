@@ -16,6 +16,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp
 
 from urc.images import media_type
+from urc.model.role import includes
 from urc.model.values import BINARY_TYPES, Reading, Signal
 from urc.protocol.sequences.commands import questions
 from urc.runtime.clock import within
@@ -39,6 +40,7 @@ from urc.web.api.wire import (
     RobotList,
     RobotSummary,
     SignalValues,
+    SiteState,
 )
 from urc.web.drive.command_runner import COMMAND_TIMEOUT_S, CommandOutcome
 from urc.web.feed.client_socket import SocketPeer
@@ -92,6 +94,8 @@ class RobotCalls:
         self._limits = RequestLimits()
         self.far: Callable[[], Iterable[RobotSummary]] = tuple
         """Function that returns the robots of other sites."""
+        self.sites: Callable[[], Iterable[SiteState]] = tuple
+        """Function that returns the other sites."""
 
     def endpoints(self) -> dict[str, Endpoint]:
         """Return the endpoints, keyed by call name."""
@@ -125,7 +129,8 @@ class RobotCalls:
             role = visitor.role(one.name)
             if role is not None and visitor.may(WATCH, one.name):
                 found.append(msgspec.structs.replace(one, role=role))
-        return RobotList(in_order(found), time())
+        sites = tuple(self.sites()) if includes(visitor.role(), "watch") else ()
+        return RobotList(in_order(found), time(), sites)
 
     @answers_errors
     async def robot(self, request: Request) -> Response:

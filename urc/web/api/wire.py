@@ -32,6 +32,7 @@ __all__ = [
     "RecordingState",
     "RobotInfo",
     "RobotList",
+    "SiteState",
     "RobotSummary",
     "SignalInfo",
     "SignalValue",
@@ -111,12 +112,26 @@ class RobotSummary(ApiMessage, frozen=True):
     """Last time at which a connection to the robot was live, in seconds since 1970 (UTC)."""
 
 
+class SiteState(ApiMessage, frozen=True):
+    """Another site of the fleet."""
+
+    name: str
+    version: str
+    """Version of URC at the site; empty if unknown."""
+    present: bool
+    """Whether the site can be reached now."""
+    fault: str = ""
+    """Why its robots cannot be used, although the site can be reached; empty if they can."""
+
+
 class RobotList(ApiMessage, frozen=True):
     """The robots that the visitor may watch, in the order of `urc.web.api.overview.in_order`."""
 
     robots: tuple[RobotSummary, ...]
     time: float = 0.0
     """Current time on the server, in seconds since 1970 (UTC)."""
+    sites: tuple[SiteState, ...] = ()
+    """Other sites of the fleet, for visitors who may watch all robots."""
 
 
 class ConfirmInfo(ApiMessage, frozen=True):

@@ -66,6 +66,7 @@ class Gateway:
         signer: SignsAssertions,
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
         begun: VisitLog,
+        refusal: Callable[[str], str],
     ) -> None:
         """Create the middleware.
 
@@ -76,12 +77,15 @@ class Gateway:
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.
             begun: identifiers of visits, and the audit log of this site.
+            refusal: function that returns why another site is refused; "" if it is not. STOP is
+                always passed on.
         """
         self._app = app
         self._client = client
         self._signer = signer
         self._followed = followed
         self._begun = begun
+        self._refusal = refusal
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass the request to another site, or call the application."""
@@ -128,9 +132,13 @@ class Gateway:
         self, scope: Scope, receive: Receive, send: Send, far: FarName, path: str
     ) -> None:
         visitor: Visitor = scope["state"]["visitor"]
-        if not is_stop(scope["method"], scope["path"]) and not visitor.may(WATCH, str(far)):
-            await told(403, WATCH.refusal)(scope, receive, send)
-            return
+        if not is_stop(scope["method"], scope["path"]):
+            if not visitor.may(WATCH, str(far)):
+                await told(403, WATCH.refusal)(scope, receive, send)
+                return
+            if refused := self._refusal(far.site):
+                await told(502, refused, "site-failed")(scope, receive, send)
+                return
         headers = [pair for pair in scope["headers"] if pair[0] in _UP]
         if (proof := self._authorization(scope, far)) is not None:
             headers.append(proof)
@@ -168,6 +176,9 @@ class Gateway:
         near = flow.taken_over()
         if proof is None or not visitor.may(WATCH, str(far)):
             await turn_away(scope, receive, send, WATCH.refusal)
+            return
+        if refused := self._refusal(far.site):
+            await turn_away(scope, receive, send, refused)
             return
         if near is None:
             return

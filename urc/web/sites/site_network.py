@@ -8,11 +8,13 @@ import ssl
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Final, Protocol, cast
 
 from starlette.types import ASGIApp
 
+from urc import __version__
 from urc.access.directory import Kind
 from urc.access.visits import Visit
 from urc.fleet.assertion import Assertion, sign_assertion, verified_assertion
@@ -20,6 +22,8 @@ from urc.fleet.bus import FleetBus
 from urc.fleet.lines import Lines
 from urc.fleet.rules import Applicant
 from urc.fleet.rules_file import RULES_FILE, RulesFile
+from urc.fleet.versions import version_refusal
+from urc.problems import UrcError
 from urc.runtime.server_recorder import ServerRecorder
 from urc.web.serve.access import Access
 from urc.web.serve.rights import ProtectedRoute
@@ -73,6 +77,7 @@ class SiteNetwork:
         *,
         member: Member | None = None,
         utc: Callable[[], float] = time.time,
+        version: str = __version__,
     ) -> None:
         """Prepare the network.
 
@@ -81,6 +86,7 @@ class SiteNetwork:
             bus: the network of the fleet.
             member: the membership, for renewals and revocations; None for fixed certificates.
             utc: UTC time in seconds since 1970.
+            version: version of URC at this site.
         """
         self._keys = keys
         self._bus = bus
@@ -88,11 +94,12 @@ class SiteNetwork:
         """The rules for visitors from other sites."""
         self._visits = VisitLog(utc)
         self._utc = utc
+        self.version = version
         self.member = member
         self.door = SiteDoor(keys.server_context, keys.peer)
         self._lines = Lines(bus, self.door.accept)
         self.client = SiteClient(self._lines, keys.client_context, keys.peer)
-        self.watch = SiteWatch(self.client, keys.folder)
+        self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version))
         self._lines.on_sites = self._sites_changed
         self._present: frozenset[str] = frozenset()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -108,7 +115,7 @@ class SiteNetwork:
     def asserted(self, assertion: Assertion, site: str) -> str:
         """Return an assertion for another site, signed by this site."""
         return sign_assertion(
-            assertion,
+            replace(assertion, version=self.version),
             issuer=self.site,
             audience=site,
             key_pem=self._keys.key_pem(),
@@ -120,10 +127,13 @@ class SiteNetwork:
 
         Raises:
             BadAssertion: the assertion does not count.
+            UrcError: the versions of the two sites are too far apart.
         """
         said = verified_assertion(
             text, issuer=peer.name, audience=self.site, key_pem=peer.key_pem, now=self._utc()
         )
+        if text := version_refusal(peer.name, said.version, self.site, self.version):
+            raise UrcError(text)
         kind = cast("Kind", said.kind)
         visit = self._judged(
             Visit(
@@ -158,7 +168,7 @@ class SiteNetwork:
 
     def around(self, app: ASGIApp, access: Access) -> ASGIApp:
         """Return the application with robots of other sites."""
-        return Gateway(app, self.client, self, access.followed, self._visits)
+        return Gateway(app, self.client, self, access.followed, self._visits, self.watch.refusal)
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes about certificates for other sites."""

@@ -17,6 +17,7 @@ from urllib.parse import quote
 
 import msgspec
 
+from urc.fleet.versions import UNKNOWN, parse_version, version_refusal
 from urc.model.profile import Profile
 from urc.model.values import Value
 from urc.private_files import make_private, put_private
@@ -24,7 +25,7 @@ from urc.problems import UrcError
 from urc.runtime.open_profile import open_document
 from urc.shipped import shipped
 from urc.web.api.documents import document_of
-from urc.web.api.wire import RobotSummary
+from urc.web.api.wire import RobotSummary, SiteState
 from urc.web.fleet.robots import Robot, SessionLike
 from urc.web.serve.replies import ApiError
 from urc.web.sites.robot_names import FarName
@@ -35,6 +36,8 @@ __all__ = ["KnownSite", "SiteWatch"]
 
 LOOK_S: Final = 2.0
 """Interval between two requests for the list of a site while a menu is open, in seconds."""
+MOST_RETRY_S: Final = 60.0
+"""Longest interval between two requests to a site that refuses its list, in seconds."""
 WATCHED_S: Final = 10.0
 """Time after a look at the menu during which lists are requested, in seconds."""
 FOLDER: Final = "documents"
@@ -68,6 +71,8 @@ class SiteWatch:
         client: SiteClient,
         folder: Path,
         clock: Callable[[], float] = time.monotonic,
+        *,
+        own: tuple[str, str] = ("", UNKNOWN),
     ) -> None:
         """Know no site yet.
 
@@ -75,11 +80,15 @@ class SiteWatch:
             client: requests to other sites.
             folder: folder of the membership.
             clock: time in seconds.
+            own: name of this site, and its version of URC.
         """
         self._client = client
         self._folder = folder / FOLDER
         self._clock = clock
+        self._own = own
         self._known: dict[str, KnownSite] = {}
+        self._asked: set[str] = set()
+        """Sites whose list has arrived since they appeared; an updated site appears again."""
         self._looked_s = -WATCHED_S
         self._news = asyncio.Event()
         self._robots: dict[FarName, tuple[str, Robot]] = {}
@@ -94,6 +103,22 @@ class SiteWatch:
         """Return whether a site can be reached now."""
         return site in self._client.sites
 
+    def refusal(self, site: str) -> str:
+        """Return why the versions of a site and this site do not fit; "" if they do."""
+        known = self._known.get(site)
+        return version_refusal(site, known.version, *self._own) if known is not None else ""
+
+    def states(self) -> list[SiteState]:
+        """Return all known sites, for the menu and for `urc fleet status`."""
+        return [
+            SiteState(name, _shown(one.version), self.is_present(name), self.refusal(name))
+            for name, one in sorted(self._known.items())
+        ]
+
+    def presence(self) -> dict[str, bool]:
+        """Return whether each known site can be reached now."""
+        return {name: self.is_present(name) for name in self._known}
+
     def changed(self) -> None:
         """Request the lists of sites that have appeared; called when the present sites change."""
         self._news.set()
@@ -101,21 +126,22 @@ class SiteWatch:
     def summaries(self) -> list[RobotSummary]:
         """Return all robots of other sites, with their names on this server, and note the look.
 
-        Robots of an absent site are lost, with the reason.
+        Robots of an absent site, or of one with a version too far apart, are lost, with the reason.
         """
         if self._clock() - self._looked_s > LOOK_S:
             self._news.set()
         self._looked_s = self._clock()
         found = []
         for site, known in sorted(self._known.items()):
-            is_here = self.is_present(site)
+            reason = self.refusal(site)
+            if not self.is_present(site):
+                reason = f"the site {site} cannot be reached"
             for robot, one in known.robots.items():
                 name = str(FarName(robot, site))
                 summary = msgspec.structs.replace(
                     one.summary, name=name, tags=(site, *one.summary.tags)
                 )
-                if not is_here:
-                    reason = f"the site {site} cannot be reached"
+                if reason:
                     summary = msgspec.structs.replace(
                         summary, state="lost", detail=reason, battery=None, holder=""
                     )
@@ -123,16 +149,21 @@ class SiteWatch:
         return found
 
     async def run(self) -> None:
-        """Request lists until cancelled."""
+        """Request lists until cancelled; a site that refuses its list is asked less and less."""
+        retry_s = LOOK_S
         while True:
             is_watched = self._clock() - self._looked_s < WATCHED_S
             here = self._client.sites
-            wanted = here if is_watched else here - self._known.keys()
+            self._asked &= here
+            wanted = here if is_watched else here - self._asked
             async with asyncio.TaskGroup() as group:
                 for site in wanted:
                     group.create_task(self._ask(site))
+            failed = {site for site in wanted if self._known[site].fault}
+            self._asked |= wanted - failed
+            retry_s = min(2 * retry_s, MOST_RETRY_S) if failed else LOOK_S
             self._news.clear()
-            wait_s = LOOK_S if is_watched or wanted else None
+            wait_s = LOOK_S if is_watched else retry_s if wanted else None
             try:
                 async with asyncio.timeout(wait_s):
                     await self._news.wait()
@@ -147,6 +178,8 @@ class SiteWatch:
         """
         if far.site not in self._known or far.robot not in self._known[far.site].robots:
             await self._ask(far.site)
+        if refused := self.refusal(far.site):
+            raise UrcError(refused)
         known = self._known.get(far.site)
         one = known.robots.get(far.robot) if known is not None else None
         if one is None:
@@ -226,3 +259,8 @@ def _keep(file: Path, data: bytes) -> None:
 def _no_session() -> AbstractAsyncContextManager[SessionLike]:
     """Refuse a session: the robot is connected to its own site."""
     raise UrcError("this robot belongs to another site")
+
+
+def _shown(version: str) -> str:
+    """Return a version as other programs may show it; "" for an invalid one."""
+    return version if parse_version(version) else ""

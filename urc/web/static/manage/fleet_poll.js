@@ -4,7 +4,7 @@
  * robots, and the request connects no robot.
  *
  * @typedef {import("./card_words.js").Summary} Summary
- * @typedef {{robots: Summary[], time: number}} RobotList
+ * @typedef {{robots: Summary[], time: number, sites?: {name: string, version: string, present: boolean, fault: string}[]}} RobotList
  */
 import { ask } from "../core/api_client.js";
 
