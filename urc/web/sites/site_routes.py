@@ -6,7 +6,8 @@ Layer 5. Only connections from other sites reach these routes.
 import asyncio
 import hashlib
 from collections.abc import Callable, Mapping
-from time import time
+from time import monotonic, time
+from typing import Final
 
 import msgspec
 from starlette.requests import Request
@@ -20,10 +21,21 @@ from urc.web.fleet.robots import RobotService
 from urc.web.serve.replies import ApiError, answer, answers_errors
 from urc.web.serve.rights import SITE, ProtectedRoute
 
-__all__ = ["DOCUMENT", "ROBOTS", "SiteList", "SiteRobot", "SiteRoutes", "digest_of_document"]
+__all__ = [
+    "DOCUMENT",
+    "ROBOTS",
+    "WAIT_S",
+    "SiteList",
+    "SiteRobot",
+    "SiteRoutes",
+    "digest_of_document",
+]
 
 ROBOTS = "/fleet/robots"
 DOCUMENT = "/fleet/documents/{name}"
+WAIT_S: Final = 2.0
+"""Longest wait for a change of the list, in seconds."""
+_LOOK_S: Final = 0.1
 
 
 class SiteRobot(msgspec.Struct, frozen=True):
@@ -42,6 +54,9 @@ class SiteList(msgspec.Struct, frozen=True):
     """UTC time at the site, in seconds since 1970."""
     version: str = ""
     """Version of URC at the site."""
+    mark: str = ""
+    """Digest of all states; a request with the newest mark waits for a change. "" from a site that
+    does not wait."""
 
 
 class SiteRoutes:
@@ -73,8 +88,21 @@ class SiteRoutes:
         ]
 
     @answers_errors
-    async def robots(self, _: Request) -> Response:
-        """Return all robots of this site."""
+    async def robots(self, request: Request) -> Response:
+        """Return all robots of this site.
+
+        With the query ``after``, wait up to `WAIT_S` for a list with another mark.
+        """
+        after = request.query_params.get("after", "")
+        end_s = monotonic() + WAIT_S
+        while True:
+            found = await self._robots()
+            mark = _mark(found)
+            if mark != after or monotonic() >= end_s:
+                return answer(SiteList(found, time(), self._version, mark))
+            await asyncio.sleep(_LOOK_S)
+
+    async def _robots(self) -> tuple[SiteRobot, ...]:
         found = []
         for name, service in sorted(self._services().items()):
             if service.robot.playback is None:
@@ -82,7 +110,7 @@ class SiteRoutes:
                 digest = digest_of_document(data) if data else ""
                 one = summary(name, service, "watch", self._times(name))
                 found.append(SiteRobot(one, digest))
-        return answer(SiteList(tuple(found), time(), self._version))
+        return tuple(found)
 
     @answers_errors
     async def document(self, request: Request) -> Response:
@@ -106,6 +134,15 @@ class SiteRoutes:
                 data = b""
             kept = self._documents[name] = (profile, data)
         return kept[1]
+
+
+def _mark(robots: tuple[SiteRobot, ...]) -> str:
+    """Return the digest of a list, without the times of last use and last data."""
+    lasting = [
+        SiteRobot(msgspec.structs.replace(one.summary, used_at=None, seen_at=None), one.digest)
+        for one in robots
+    ]
+    return hashlib.sha256(msgspec.json.encode(lasting)).hexdigest()
 
 
 def digest_of_document(data: bytes) -> str:

@@ -1,7 +1,8 @@
 """The other sites, as known to this dashboard: their robots, states and documents.
 
-Layer 5. A site's list is requested when the site appears, and again while a menu
-is open. A document is requested when its page opens, checked against its digest, and kept.
+Layer 5. A site's list is requested when the site appears, and again while a menu is open. The site
+answers such a request as soon as its list changes. A document is requested when its page opens,
+checked against its digest, and kept.
 """
 
 import asyncio
@@ -9,7 +10,7 @@ import hmac
 import logging
 import time
 from collections.abc import Callable
-from contextlib import AbstractAsyncContextManager
+from contextlib import AbstractAsyncContextManager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -34,8 +35,10 @@ from urc.web.sites.site_routes import ROBOTS, SiteList, SiteRobot, digest_of_doc
 
 __all__ = ["KnownSite", "SiteWatch"]
 
+PAUSE_S: Final = 0.2
+"""Pause between two requests for the list of a site while a menu is open, in seconds."""
 LOOK_S: Final = 2.0
-"""Interval between two requests for the list of a site while a menu is open, in seconds."""
+"""The same after a failed request, and for a site that does not wait for a change, in seconds."""
 MOST_RETRY_S: Final = 60.0
 """Longest interval between two requests to a site that refuses its list, in seconds."""
 WATCHED_S: Final = 10.0
@@ -87,10 +90,9 @@ class SiteWatch:
         self._clock = clock
         self._own = own
         self._known: dict[str, KnownSite] = {}
-        self._asked: set[str] = set()
-        """Sites whose list has arrived since they appeared; an updated site appears again."""
         self._looked_s = -WATCHED_S
         self._news = asyncio.Event()
+        self._looks = asyncio.Event()
         self._robots: dict[FarName, tuple[str, Robot]] = {}
         """The newest opened document of each robot: its digest, and the robot made from it."""
 
@@ -128,9 +130,8 @@ class SiteWatch:
 
         Robots of an absent site, or of one with a version too far apart, are lost, with the reason.
         """
-        if self._clock() - self._looked_s > LOOK_S:
-            self._news.set()
         self._looked_s = self._clock()
+        self._looks.set()
         found = []
         for site, known in sorted(self._known.items()):
             reason = self.refusal(site)
@@ -149,26 +150,35 @@ class SiteWatch:
         return found
 
     async def run(self) -> None:
-        """Request lists until cancelled; a site that refuses its list is asked less and less."""
-        retry_s = LOOK_S
+        """Request lists until cancelled; a site that hangs delays the lists of no other."""
+        following: dict[str, asyncio.Task[None]] = {}
+        async with asyncio.TaskGroup() as group:
+            while True:
+                here = self._client.sites
+                for site in following.keys() - here:
+                    following.pop(site).cancel()
+                for site in here - following.keys():
+                    following[site] = group.create_task(self._follow(site))
+                self._news.clear()
+                await self._news.wait()
+
+    async def _follow(self, site: str) -> None:
+        """Request the list of a site now, and again while a menu is open, until cancelled.
+
+        A site that refuses its list is asked less and less while no menu is open.
+        """
+        mark, retry_s = "", LOOK_S
         while True:
-            is_watched = self._clock() - self._looked_s < WATCHED_S
-            here = self._client.sites
-            self._asked &= here
-            wanted = here if is_watched else here - self._asked
-            async with asyncio.TaskGroup() as group:
-                for site in wanted:
-                    group.create_task(self._ask(site))
-            failed = {site for site in wanted if self._known[site].fault}
-            self._asked |= wanted - failed
-            retry_s = min(2 * retry_s, MOST_RETRY_S) if failed else LOOK_S
-            self._news.clear()
-            wait_s = LOOK_S if is_watched else retry_s if wanted else None
-            try:
-                async with asyncio.timeout(wait_s):
-                    await self._news.wait()
-            except TimeoutError:
-                continue
+            mark = await self._ask(site, mark)
+            has_failed = bool(self._known[site].fault)
+            retry_s = min(2 * retry_s, MOST_RETRY_S) if has_failed else LOOK_S
+            await asyncio.sleep(PAUSE_S if mark else LOOK_S)
+            if self._clock() - self._looked_s >= WATCHED_S:
+                mark = ""
+                self._looks.clear()
+                with suppress(TimeoutError):
+                    async with asyncio.timeout(retry_s if has_failed else None):
+                        await self._looks.wait()
 
     async def robot(self, far: FarName) -> Robot:
         """Return a robot of another site for its page, made from the site's document.
@@ -194,10 +204,17 @@ class SiteWatch:
             kept = self._robots[far] = (one.digest, robot)
         return replace(kept[1], is_emulated=one.summary.emulated)
 
-    async def _ask(self, site: str) -> None:
+    async def _ask(self, site: str, after: str = "") -> str:
+        """Request the list of a site; return its mark, or "" after a failure.
+
+        Args:
+            site: the site's name.
+            after: mark of the newest list; the site waits for another one.
+        """
         before = self._known.get(site)
+        target = f"{ROBOTS}?after={after}" if after else ROBOTS
         try:
-            async with self._client.request(site, "GET", ROBOTS) as response:
+            async with self._client.request(site, "GET", target) as response:
                 body = await response.whole()
             if response.status != 200:
                 raise SiteFailed(f"the site {site} refuses its list (status {response.status})")
@@ -207,9 +224,10 @@ class SiteWatch:
             robots = before.robots if before is not None else {}
             version = before.version if before is not None else ""
             self._known[site] = KnownSite(site, robots, self._clock(), version, str(error))
-            return
+            return ""
         robots = {one.summary.name: one for one in found.robots[:MAX_ROBOTS]}
         self._known[site] = KnownSite(site, robots, self._clock(), found.version)
+        return found.mark
 
     async def _profile(self, far: FarName, digest: str) -> Profile:
         if shipped_profile := await asyncio.to_thread(_shipped, far.robot, digest):
