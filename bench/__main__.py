@@ -47,6 +47,7 @@ NAMES = (
     "motion_freeze",
     "motion_foxglove",
     "motion_zenoh",
+    "fleet_cuts",
     "motion_counters",
     "motion_flood",
     "motion_idle",

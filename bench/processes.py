@@ -1,11 +1,11 @@
-"""Processor time and memory of running processes, from ``/proc``."""
+"""Processor time, memory and network use of running processes, from ``/proc``."""
 
 import os
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-__all__ = ["cpu_s", "own_mb", "resident_mb", "spent_s"]
+__all__ = ["carried_bytes", "cpu_s", "own_mb", "resident_mb", "spent_s"]
 
 _TICKS_HZ = os.sysconf("SC_CLK_TCK")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
@@ -35,6 +35,13 @@ def own_mb(process: int) -> float:
     """Return a process's memory, including its proportional share of shared memory (PSS)."""
     words = re.search(r"(?m)^Pss: +(\d+) kB", _read(process, "smaps_rollup"))
     return int(words[1]) * 1024 / 1e6 if words else 0.0
+
+
+def carried_bytes(process: int, device: str) -> tuple[int, int]:
+    """Return the received and sent bytes of a network interface in a process's namespace."""
+    words = re.search(rf"(?m)^ *{device}: *(.*)$", _read(process, "net/dev"))
+    counts = words[1].split() if words else ["0"] * 16
+    return int(counts[0]), int(counts[8])
 
 
 def _read(process: int, name: str) -> str:

@@ -297,21 +297,22 @@ def can_relay() -> bool:
 
 
 class Relay(Program):
-    """A link between two network namespaces; see `bench.rig.relay_process`."""
+    """A link between network namespaces; see `bench.rig.relay_process`."""
 
-    def __init__(self) -> None:
+    def __init__(self, sides: str = "ab") -> None:
+        """Make a namespace for each side; `sides` are their names, one letter each."""
         self._done = 0
         self._doing = threading.Lock()
-        super().__init__(_script("relay_process.py"))
+        super().__init__(_script("relay_process.py", sides))
         _, *found = self.wait_for("ready")
-        self._descriptors = dict(zip("ab", found, strict=True))
+        self._descriptors = dict(zip(sides, found, strict=True))
 
     def take(self, line: str) -> None:
         """Count the orders that the relay has executed."""
         self._done += line.startswith("done")
 
     def inside(self, side: str) -> tuple[str, ...]:
-        """Return the command prefix that starts a program on side ``a`` or ``b``."""
+        """Return the command prefix that starts a program on a side."""
         return ("nsenter", f"--net=/proc/{self.pid}/fd/{self._descriptors[side]}", "--")
 
     def do(self, *orders: str) -> int:

@@ -1,12 +1,13 @@
-"""A slow, lossy or interrupted link between two network namespaces: a separate program.
+"""A slow, lossy or interrupted link between network namespaces: a separate program.
 
 The program needs Linux, root and /dev/net/tun, and imports nothing from URC. ``python
-relay_process.py`` creates two namespaces with a TUN device each, and forwards packets between the
-devices. Side ``a`` has the address 10.77.0.1, side ``b`` has 10.77.0.2, and both have their own
-loopback. ``nsenter --net=/proc/PID/fd/FD`` starts other programs in a namespace. The program
-reports on standard output::
+relay_process.py abc`` creates three namespaces with a TUN device each, and forwards packets between
+the devices; without the argument, there are the sides ``a`` and ``b``. Side ``a`` has the address
+10.77.0.1, side ``b`` has 10.77.0.2 and so on, and each has its own loopback.
+``nsenter --net=/proc/PID/fd/FD`` starts other programs in a namespace. The program reports on
+standard output::
 
-    ready FD_A FD_B         descriptors of the two namespaces in this process
+    ready FD_A FD_B …       descriptors of the namespaces in this process
     done TIME               the last order was executed, monotonic nanoseconds
 
 Orders on standard input, one per line, with times in milliseconds::
@@ -32,6 +33,7 @@ import socket
 import struct
 import sys
 import time
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 CLONE_NEWNET = 0x40000000
@@ -39,8 +41,6 @@ TUNSETIFF = 0x400454CA
 IFF_TUN_NO_PI = 0x1001
 SIOCSIFADDR, SIOCSIFNETMASK, SIOCGIFFLAGS, SIOCSIFFLAGS = 0x8916, 0x891C, 0x8913, 0x8914
 IFF_UP = 1
-SIDES = ("a", "b")
-ADDRESSES = {"a": "10.77.0.1", "b": "10.77.0.2"}
 DEVICE = b"tun0"
 MOST_WAITING = 4096
 """Largest number of packets in transit; additional packets are lost, as on any link."""
@@ -51,7 +51,7 @@ MOST_QUEUED_NS = 1_000_000_000
 
 @dataclass
 class Side:
-    """One end of the link between the two namespaces."""
+    """One end of the link between the namespaces."""
 
     name: str
     namespace: int
@@ -70,22 +70,22 @@ class Weather:
     loss: float = 0.0
     bit_ns: float = 0.0
     """Time that a side needs to send one bit, in nanoseconds; 0 for a link without a rate."""
-    free_ns: dict[str, int] = field(default_factory=lambda: {"a": 0, "b": 0})
+    free_ns: dict[str, int] = field(default_factory=lambda: defaultdict(int))
     """Time at which a side has sent all its packets, keyed by side."""
-    is_cut: dict[str, bool] = field(default_factory=lambda: {"a": False, "b": False})
+    is_cut: dict[str, bool] = field(default_factory=lambda: defaultdict(bool))
     """Whether all packets that a side sends are lost, keyed by side."""
-    ports: dict[str, set[int]] = field(default_factory=lambda: {"a": set(), "b": set()})
+    ports: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
     """Blocked ports of each side. A side's packets to or from a blocked port are lost."""
 
 
-def made(name: str) -> Side:
+def made(name: str, address: str) -> Side:
     """Move this process into a new namespace; return its end of the link, with an active device."""
     if ctypes.CDLL(None, use_errno=True).unshare(CLONE_NEWNET) != 0:
         raise OSError(ctypes.get_errno(), "cannot create a network namespace; this needs root")
     tun = os.open("/dev/net/tun", os.O_RDWR | os.O_NONBLOCK)
     fcntl.ioctl(tun, TUNSETIFF, struct.pack("16sH", DEVICE, IFF_TUN_NO_PI))
     control = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    _address(control, SIOCSIFADDR, ADDRESSES[name])
+    _address(control, SIOCSIFADDR, address)
     _address(control, SIOCSIFNETMASK, "255.255.255.0")
     side = Side(name, os.open("/proc/self/ns/net", os.O_RDONLY), tun, control)
     switch(side, b"lo", is_up=True)
@@ -120,11 +120,13 @@ def ports_of(packet: bytes) -> tuple[int, int]:
 class Relay:
     """The loop that forwards packets between the sides and executes orders."""
 
-    def __init__(self) -> None:
+    def __init__(self, sides: str) -> None:
         self.weather = Weather()
         self._dice = random.Random(7)  # noqa: S311 - the same losses in every run
-        self._sides = {name: made(name) for name in SIDES}
-        self._waiting: list[tuple[int, int, str, bytes]] = []
+        addresses = {name: f"10.77.0.{number}" for number, name in enumerate(sides, 1)}
+        self._sides = {name: made(name, address) for name, address in addresses.items()}
+        self._side_of = {socket.inet_aton(address): name for name, address in addresses.items()}
+        self._waiting: list[tuple[int, int, str, str, bytes]] = []
         self._numbers = 0
         self._orders = b""
         self._selector = selectors.DefaultSelector()
@@ -155,7 +157,8 @@ class Relay:
             weather = self.weather
             lost = weather.is_cut[side.name] or len(self._waiting) >= MOST_WAITING
             lost = lost or not weather.ports[side.name].isdisjoint(ports_of(packet))
-            if lost or (weather.loss and self._dice.random() < weather.loss):
+            target = self._side_of.get(packet[16:20]) if packet[0] >> 4 == 4 else None
+            if lost or target is None or (weather.loss and self._dice.random() < weather.loss):
                 continue
             sent_ns = self._sent_ns(side.name, len(packet))
             if sent_ns is None:
@@ -164,8 +167,7 @@ class Relay:
             if weather.jitter_ns:
                 due_ns += self._dice.randrange(weather.jitter_ns)
             self._numbers += 1
-            other = "b" if side.name == "a" else "a"
-            heapq.heappush(self._waiting, (due_ns, self._numbers, other, packet))
+            heapq.heappush(self._waiting, (due_ns, self._numbers, side.name, target, packet))
 
     def _sent_ns(self, name: str, size: int) -> int | None:
         """Return when a side has sent a packet of `size` bytes; None if the packet is lost."""
@@ -181,7 +183,7 @@ class Relay:
     def _deliver(self) -> None:
         now_ns = time.monotonic_ns()
         while self._waiting and self._waiting[0][0] <= now_ns:
-            _, _, name, packet = heapq.heappop(self._waiting)
+            *_, name, packet = heapq.heappop(self._waiting)
             try:
                 os.write(self._sides[name].tun, packet)
             except OSError:
@@ -210,19 +212,15 @@ class Relay:
         elif verb in ("down", "up"):
             switch(self._sides[what], DEVICE, is_up=verb == "up")
         elif what.isdigit():
-            for side in words[2:] or SIDES:
+            for side in words[2:] or self._sides:
                 ports = weather.ports[side]
                 (ports.add if verb == "cut" else ports.discard)(int(what))
         else:
-            for side in [what] if what else SIDES:
+            for side in [what] if what else self._sides:
                 weather.is_cut[side] = verb == "cut"
             if verb == "cut":  # packets in transit are lost too
-                self._waiting = [one for one in self._waiting if not weather.is_cut[_from(one)]]
+                self._waiting = [one for one in self._waiting if not weather.is_cut[one[2]]]
                 heapq.heapify(self._waiting)
-
-
-def _from(one: tuple[int, int, str, bytes]) -> str:
-    return "b" if one[2] == "a" else "a"
 
 
 def tell(*words: object) -> None:
@@ -232,6 +230,6 @@ def tell(*words: object) -> None:
 
 if __name__ == "__main__":
     try:
-        Relay().run()
+        Relay(sys.argv[1] if len(sys.argv) > 1 else "ab").run()
     except OSError as error:
         sys.exit(f"relay_process: {error}")

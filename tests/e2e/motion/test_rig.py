@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from bench.processes import carried_bytes
 from bench.rig.programs import SERVER_ADDRESS, Operators, Program, Relay, Robots
 from bench.rig.relay_process import ports_of
 
@@ -208,6 +209,21 @@ def test_loss_loses_packets(relay: Relay, robots: Robots) -> None:
         # Each try that is lost doubles the wait before the next: it ends only where losses end.
         relay.do("loss 0")
         until_heard(robots, end_sending(program))
+
+
+@pytest.mark.needs("tun")
+def test_a_relay_with_three_sides_delivers_to_the_address() -> None:
+    """No packet from the first side to the second reaches the third."""
+    with Relay("abc") as relay:
+        places = [f"tcp:10.77.0.{number}:0" for number in (2, 3)]
+        with (
+            Robots(places[:1], inside=relay.inside("b")) as second,
+            Robots(places[1:], inside=relay.inside("c")) as third,
+            sender(relay, second),
+        ):
+            until_heard(second, 5)
+            assert carried_bytes(second.pid, "tun0")[0] > 0
+            assert carried_bytes(third.pid, "tun0")[0] == 0
 
 
 def test_ports_are_read_out_of_packets() -> None:
