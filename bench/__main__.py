@@ -48,6 +48,8 @@ NAMES = (
     "motion_foxglove",
     "motion_zenoh",
     "fleet_cuts",
+    "fleet_ticks",
+    "fleet_size",
     "motion_counters",
     "motion_flood",
     "motion_idle",

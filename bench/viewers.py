@@ -25,6 +25,8 @@ KEY = os.environ.get("URC_BENCH_KEY")
 """Start key of the server; the default is the key of test servers."""
 CHUNK = 1 << 18
 OPEN_TIMEOUT_S = 10
+PING = 9
+"""Opcode of a ping, whose payload is short; a page that does not answer is disconnected."""
 
 
 class Viewer:
@@ -61,8 +63,13 @@ class Viewer:
             size = head_and_body(data)
             if size is None:
                 break
+            if data[0] & 0x0F == PING:
+                if len(data) < size:
+                    break
+                self.line.send(bytes([0x8A, 0x80 | size - 2]) + bytes(4) + data[2:size])
+            else:
+                self.messages += 1
             self.skip = size
-            self.messages += 1
         else:
             self.skip -= len(data)
             data = b""

@@ -1,13 +1,15 @@
 """Robots in one process, one for each connection: ``python fleet.py SIGNALS RATE_HZ``.
 
 The program prints its port. Each line contains all of a robot's signals, as JSON. Every value
-changes in every line.
+changes in every line. The program ends when its standard input closes.
 """
 
 import asyncio
 import contextlib
 import json
+import os
 import sys
+import threading
 import time
 from itertools import cycle
 
@@ -29,8 +31,15 @@ def lines(signals: int) -> list[bytes]:
     ]
 
 
+def end_with_input() -> None:
+    """End the program when its standard input closes."""
+    sys.stdin.read()
+    os._exit(0)
+
+
 async def main() -> None:
     """Serve every client as a separate robot."""
+    threading.Thread(target=end_with_input, daemon=True).start()
     told, period_s = lines(int(sys.argv[1])), 1 / float(sys.argv[2])
     robots = 0
 
