@@ -21,6 +21,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 OPEN_PATHS = {
     "/healthz",
     "/api/v1/robots/{name}/stop",
+    "/api/v1/stop",
     "/api/v1/codes",
     "/api/v1/guest",
     "/api/v1/join",

@@ -7,6 +7,7 @@ from urc.web.api.calls import CALLS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "api.md").read_text("utf-8")
 ROWS = re.findall(r"^\| `(GET|POST) (/[^`]+)` \| ([^|]+?) \|$", PAGE, re.MULTILINE)
+ABOUT_ROBOTS = ("/api/v1/robots", "/api/v1/recordings", "/api/v1/audit", "/api/v1/stop")
 
 
 def test_the_rights_on_the_page_are_those_of_the_calls() -> None:
@@ -26,7 +27,7 @@ def test_every_call_about_robots_is_on_the_page() -> None:
     robots = {
         call.path
         for call in CALLS
-        if call.path.startswith(("/api/v1/robots", "/api/v1/recordings", "/api/v1/audit"))
+        if call.path.startswith(ABOUT_ROBOTS)
         and not call.path.endswith(("/recording", "/recording/move", "/settings", "/dev/start"))
     }
     assert robots == told

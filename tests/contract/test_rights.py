@@ -17,6 +17,7 @@ from urc.wire.client_messages import RIGHTS, ClientMessage
 
 OPEN_TO_ALL = {
     "/api/v1/robots/{name}/stop",
+    "/api/v1/stop",
     "/app.webmanifest",
     "/favicon.ico",
     "/api/v1/codes",

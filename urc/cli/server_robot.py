@@ -20,13 +20,12 @@ if TYPE_CHECKING:
 __all__ = ["add_server", "opened_robot", "refuse_local_options"]
 
 
-def add_server(parser: argparse.ArgumentParser) -> None:
-    """Declare the options that select a robot on a server."""
-    parser.add_argument(
-        "--server",
-        metavar="URL",
-        help="use the robot PROFILE on a server, such as https://robots.lab:8080",
-    )
+def add_server(
+    parser: argparse.ArgumentParser,
+    server: str = "use the robot PROFILE on a server, such as https://robots.lab:8080",
+) -> None:
+    """Declare the options that select a robot on a server; `server` explains ``--server``."""
+    parser.add_argument("--server", metavar="URL", help=server)
     parser.add_argument(
         "--token-file",
         metavar="FILE",
@@ -69,7 +68,7 @@ def _is_given(arguments: argparse.Namespace, option: str) -> bool:
     name = {"--set": "settings", "--settings": "settings_file", "--data-dir": "data"}.get(
         option, option.removeprefix("--").replace("-", "_")
     )
-    return bool(getattr(arguments, name))
+    return bool(getattr(arguments, name, None))
 
 
 def opened_robot(arguments: argparse.Namespace) -> "AbstractAsyncContextManager[RemoteRobot]":

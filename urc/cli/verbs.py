@@ -16,6 +16,7 @@ VERBS: dict[str, str] = {
     "simulate": "emulate the robot of a profile on its real ports",
     "watch": "print a robot's signals as JSON lines",
     "send": "run one command of a robot and print the reply",
+    "stop": "stop robots of a server, and print the result of each robot",
     "record": "record a session to a file, until Ctrl-C",
     "replay": "replay a recording in the dashboard",
     "export": "write a video of a recording to an MP4 file",
@@ -44,7 +45,10 @@ VERBS: dict[str, str] = {
 }
 
 GROUPS: dict[str, tuple[str, ...]] = {
-    "drive": ("demo", "serve", "watch", "send", "record", "replay", "export", "trust", "discover"),
+    "drive": (
+        *("demo", "serve", "watch", "send", "stop", "record", "replay", "export", "trust"),
+        "discover",
+    ),
     "write and check documents": (
         *("validate", "explain", "simulate", "docs", "resolve", "migrate", "new", "schema"),
     ),

@@ -46,6 +46,11 @@ class ServerAddress(NamedTuple):
         """Return the HTTP address to which a request stops a robot and latches STOP."""
         return f"{self.url}/api/v1/robots/{quote(robot, safe='')}/stop"
 
+    @property
+    def stop_several(self) -> str:
+        """HTTP address to which a request stops several robots."""
+        return f"{self.url}/api/v1/stop"
+
     def alarms(self, robot: str, verb: str) -> str:
         """Return the address of an action on a robot's alarms, such as ``acknowledge``."""
         return f"{self.url}/api/v1/robots/{quote(robot, safe='')}/alarms/{verb}"

@@ -41,6 +41,7 @@ from urc.client.remote_commands import RemoteCommands
 from urc.client.remote_motion import ControlMessage, RemoteMotion, plain_arguments
 from urc.client.robot import ConnectionLost
 from urc.client.robot_socket import RobotSocket
+from urc.client.server_request import post
 from urc.client.stick import VALID_S, Stick
 from urc.model.values import BINARY_TYPES, Reading, Sample, Signal
 from urc.problems import UrcError
@@ -68,7 +69,6 @@ _MOST_IMAGES: Final = 64
 _GOODBYE_S: Final = 1.5
 _LINKS_S: Final = 1.0
 """Maximum wait, in seconds, for the transports' state, which follows the first message."""
-_POST_S: Final = 3.0
 
 log = logging.getLogger(__name__)
 
@@ -384,29 +384,7 @@ class RemoteRobot(HubReadings):
     async def _post(
         self, address: str, body: Mapping[str, Any] | None, what: str
     ) -> Mapping[str, Any]:
-        """Send a request over HTTP, and return the server's answer.
-
-        Raises:
-            ConnectionLost: the server could not be reached.
-            UrcError: the server refused the request.
-        """
-        import httpx2  # takes time to import, and few programs need it
-
-        headers = {"Authorization": f"Bearer {self._token}"} if self._token else {}
-        try:
-            async with httpx2.AsyncClient(
-                verify=self._context if self._context is not None else True,
-                # A proxy set in the environment cannot reach this computer, and would read the
-                # token.
-                trust_env=not self._address.is_loopback,
-                timeout=_POST_S,
-            ) as client:
-                answer = await client.post(address, headers=headers, json=body)
-                said = answer.json()
-        except (httpx2.HTTPError, OSError, ValueError) as error:
-            raise ConnectionLost(f"{what} could not be delivered: {error}") from error
-        if not isinstance(said, dict):
-            raise UrcError(f"the server answered {answer.status_code}")
-        if not answer.is_success:
-            raise UrcError(str(said.get("error", f"the server answered {answer.status_code}")))
-        return said
+        """Send a request over HTTP; see `urc.client.server_request.post`."""
+        return await post(
+            self._address, address, body, what, token=self._token, context=self._context
+        )

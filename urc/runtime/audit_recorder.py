@@ -97,6 +97,7 @@ class AuditRecorder:
         self._refusals = RepeatLimiter[tuple[str, str, str]]()
         self._lease = LeaseState()
         self._cause: Operator | None = None
+        self._stop_id = ""
 
     def attend(self, hub: Hub | None, now: Callable[[], float]) -> None:
         """From now on, also report each entry to the taps of a session's hub.
@@ -167,13 +168,17 @@ class AuditRecorder:
             self._record("refused", client, command=about, outcome=outcome, times=count)
 
     @contextmanager
-    def caused_by(self, operator: Operator | None) -> Iterator[None]:
-        """Record `operator` as the cause of STOP and its reset while the context is open."""
-        before, self._cause = self._cause, operator
+    def caused_by(self, operator: Operator | None, stop_id: str = "") -> Iterator[None]:
+        """Record `operator` as the cause of STOP and its reset while the context is open.
+
+        `stop_id` identifies the STOP of several robots; "" for the STOP of one robot.
+        """
+        before, self._cause = (self._cause, self._stop_id), operator
+        self._stop_id = stop_id
         try:
             yield
         finally:
-            self._cause = before
+            self._cause, self._stop_id = before
 
     @_harmless
     def leased(self, state: LeaseState, now: float) -> None:
@@ -181,7 +186,9 @@ class AuditRecorder:
         before, self._lease = self._lease, state
         cause = self._cause or _NOBODY
         if state.latched_by and not before.latched_by:
-            self._record("STOP", cause, epoch=state.epoch, outcome=f"by {state.latched_by}")
+            about = _json({"stop": self._stop_id}) if self._stop_id else ""
+            outcome = f"by {state.latched_by}"
+            self._record("STOP", cause, epoch=state.epoch, arguments=about, outcome=outcome)
         elif before.latched_by and not state.latched_by:
             self._record("reset", cause, epoch=state.epoch, outcome="may be driven again")
         if state.holder != before.holder:

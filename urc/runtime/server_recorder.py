@@ -243,6 +243,20 @@ class ServerRecorder:
         actor = Actor(place=place)
         self._repeat(_Repeated("STOP", actor, robot, "", "pressed without a sign-in"))
 
+    def far_stop(self, actor: Actor, robot: str, stop_id: str, outcome: str) -> None:
+        """Record the STOP of a robot of another site; presses without a sign-in are counted.
+
+        Args:
+            actor: the visitor of this server.
+            robot: name of the robot with its site.
+            stop_id: identifier of the STOP, as in the audit log of the other site.
+            outcome: result as text for display.
+        """
+        if not actor.principal:
+            self.stopped_by_unknown(robot, actor.place)
+            return
+        self._record("STOP", actor, robot=robot, arguments={"stop": stop_id}, outcome=outcome)
+
     def check_clock(self) -> None:
         """Record a jump if the machine's clock was set since the last call."""
         ahead_s = self._utc() - self._now()

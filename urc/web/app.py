@@ -42,7 +42,7 @@ from urc.web.alarms.routes import AlarmCalls
 from urc.web.api.calls import api_routes
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
-from urc.web.api.stop import delivered_stop, press_stop
+from urc.web.api.stop_calls import FarRobots, StopCalls
 from urc.web.api_document import DOCUMENT, document
 from urc.web.audit.routes import AuditRoutes
 from urc.web.dev.routes import Dev, dev_url, no_dev_routes
@@ -50,7 +50,7 @@ from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
 from urc.web.drive.redundant_socket import RedundantSocket
 from urc.web.fleet.contact_watch import ContactWatch
-from urc.web.fleet.fleet import Fleet, service_of
+from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
 from urc.web.fleet.robots import LINGER_S, Playback, Robot, RobotService, missing_settings
 from urc.web.foxglove.socket import FoxgloveServer, TokenInAddress
@@ -72,10 +72,10 @@ from urc.web.people.ways_in import SignInOptions, WaysIn
 from urc.web.picture_socket import PictureSocket
 from urc.web.robot_services import Stores, fleet_of, latch_of
 from urc.web.serve.access import Access
-from urc.web.serve.actors import record_admission, record_bad_token, stopper_of
+from urc.web.serve.actors import record_admission, record_bad_token
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
-from urc.web.serve.replies import API, Endpoint, answer, answers_errors, told
+from urc.web.serve.replies import API, Endpoint, told
 from urc.web.serve.rights import (
     DRIVE,
     LOCAL,
@@ -95,9 +95,11 @@ from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
 from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, error_page, robot_page
 from urc.web.show.trust import TrustPages
+from urc.web.sites.far_stops import FarStops
 from urc.web.sites.robot_names import far_name
 from urc.web.sites.site_network import SiteNetwork
 from urc.web.sites.site_routes import SiteRoutes
+from urc.web.sites.stop_routes import StopRoutes
 from urc.web.wire import messages as wire
 
 __all__ = ["DashboardOptions", "Robot", "build_app", "serve"]
@@ -178,6 +180,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
         access=access,
         recording_calls=RecordingCalls(lambda: fleet.services, options.recordings, recorder),
         robot_calls=RobotCalls(lambda: fleet.services, access.followed, contacts.times),
+        stop_calls=StopCalls(lambda: fleet.services, recorder),
         contacts=contacts,
         alarm_calls=AlarmCalls(lambda: fleet.services, alarms, recorder, notifier),
         alarms=alarms,
@@ -192,8 +195,7 @@ def build_app(robots: Mapping[str, Robot], options: DashboardOptions = _DEFAULT)
     )
     if options.network is not None:
         options.network.attach(access, recorder)
-        routes.robot_calls.far = options.network.watch.summaries
-        routes.robot_calls.sites = options.network.watch.states
+        routes.add_sites(options.network)
     access.tags_of = routes.tags_of
     access.on_admit = partial(record_admission, recorder)
     access.on_bad_token = partial(record_bad_token, recorder)
@@ -251,6 +253,7 @@ class _Dashboard(Starlette):
                 *(routes.network.routes() if routes.network is not None else ()),
                 *SiteRoutes(lambda: routes.services, routes.contacts.times, version).routes(),
                 *routes.metrics.routes(),
+                *StopRoutes(routes.stop_calls.local).routes(),
                 ProtectedRoute("/frames/{widget}", frames.frame, SIGNED_IN),
                 *ExternalPages(lambda: routes.robots).routes(),
                 ProtectedSocket("/ws", routes.socket, SIGNED_IN),
@@ -286,6 +289,7 @@ class _Routes:
     recorder: ServerRecorder
     recording_calls: RecordingCalls
     robot_calls: RobotCalls
+    stop_calls: StopCalls
     contacts: ContactWatch
     alarm_calls: AlarmCalls
     ways_in: WaysIn
@@ -320,6 +324,13 @@ class _Routes:
             self.dev = Dev(self.fleet.services, options.remake, self.renew)
             self.dev_start = DevStart(self.fleet, options.remake, self.renew, self.ways)
 
+    def add_sites(self, network: SiteNetwork) -> None:
+        """Add the robots of other sites."""
+        far = FarStops(network.stops, network.watch, self.recorder)
+        self.robot_calls.far = network.watch.summaries
+        self.robot_calls.sites = network.watch.states
+        self.stop_calls.far = FarRobots(network.watch.summaries, far.stop)
+
     def with_calls(self) -> "list[_Part]":
         """Return the objects that provide both pages and API calls."""
         found: list[_Part] = [
@@ -337,11 +348,11 @@ class _Routes:
         """Return the API endpoints of every server, keyed by call name."""
         return {
             "health": self.health,
-            "stop": self.stop,
             "controls": self.controls,
             "playback": self.recording,
             "playback_move": self.move,
             **self.robot_calls.endpoints(),
+            **self.stop_calls.endpoints(),
             **self.alarm_calls.endpoints(),
             **self.recording_calls.endpoints(),
         }
@@ -508,13 +519,6 @@ class _Routes:
 
     async def health(self, _: Request) -> Response:
         return JSONResponse({"status": "ok", "version": __version__}, headers=_PAGE)
-
-    @answers_errors
-    async def stop(self, request: Request) -> Response:
-        """Stop a robot and latch STOP; pages without a working socket use this request."""
-        name, service = service_of(self.services, request)
-        press_stop(name, service, stopper_of(request, name), self.recorder)
-        return answer(await delivered_stop(service))
 
     async def controls(self, request: Request) -> Response:
         """Return a robot's lease and the state of its STOP."""

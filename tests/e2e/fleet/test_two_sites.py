@@ -65,10 +65,10 @@ async def test_a_lost_screen_stops_the_robot(sites: TwoSites, number: signal.Sig
         driving = asyncio.create_task(hold(robot, 30.0))
         await reaches(beside, least=FAST)
         assert sites.zug.process is not None
-        signal_process(sites.zug.process, number)
+        sites.zug.signal(number)
         await reaches(beside, most=SLOW)
         if number == signal.SIGSTOP:
-            signal_process(sites.zug.process, signal.SIGCONT)
+            sites.zug.signal(signal.SIGCONT)
             await asyncio.sleep(2.0)
             sample = beside.latest("speed")
             assert sample is not None
@@ -138,8 +138,3 @@ def visits(site: Site) -> list[dict[str, str]]:
     """Return the entries about visits in a site's audit log."""
     lines = site.command("audit", "--export", "-").splitlines()
     return [one for one in map(json.loads, lines) if one.get("what") == "visit"]
-
-
-def signal_process(process: UrcProcess, number: signal.Signals) -> None:
-    """Send a signal to a server."""
-    os.kill(process.pid, number)

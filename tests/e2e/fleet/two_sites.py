@@ -1,9 +1,13 @@
-"""Two servers in processes of their own, for tests: a site with a robot, a site with a screen."""
+"""Two servers in processes of their own, for tests: a site with robots, a site with a screen."""
 
 import asyncio
+import os
+import signal
 import time
+from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from typing import Any
 
 import urllib3
 
@@ -26,9 +30,9 @@ FAST, SLOW = 0.05, 0.02
 class Site:
     """A site: its data folder, and its server."""
 
-    def __init__(self, data: Path, robot: str) -> None:
+    def __init__(self, data: Path, *robots: str) -> None:
         self.data = data
-        self.robot = robot
+        self.robots = robots
         self.port = free_port()
         self.process: UrcProcess | None = None
         self.key = ""
@@ -41,7 +45,7 @@ class Site:
 
     def start(self) -> None:
         """Start the server, and wait for its address."""
-        words = ("serve", self.robot, "--simulate", "--fleet", "--port", str(self.port))
+        words = ("serve", *self.robots, "--simulate", "--fleet", "--port", str(self.port))
         self.process = UrcProcess((*words, "--data-dir", str(self.data)), {})
         address = self.process.wait_for(r"dashboard (http\S+)")[1]
         self.key = with_key(address).partition("key=")[2]
@@ -57,7 +61,7 @@ class Site:
             f"http://127.0.0.1:{self.port}", robot, token=self.key, timeout=WAIT_S
         )
 
-    def ask(self, path: str, body: object = None) -> tuple[int, dict[str, str]]:
+    def ask(self, path: str, body: object = None) -> tuple[int, dict[str, Any]]:
         """Return the status and the decoded body of a response; POST with a body, else GET."""
         headers = {"authorization": f"Bearer {self.key}"}
         method = "GET" if body is None else "POST"
@@ -66,19 +70,33 @@ class Site:
         )
         return found.status, found.json()
 
+    def signal(self, number: signal.Signals) -> None:
+        """Send a signal to the server."""
+        assert self.process is not None
+        os.kill(self.process.pid, number)
+
 
 class TwoSites:
-    """The site bern with the authority and a TurtleBot, and the site zug with a screen."""
+    """The site bern with the authority, and the site zug, which connects to it."""
 
-    def __init__(self, folder: Path, way: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        way: int | None = None,
+        *,
+        bern: Sequence[str] = (ROBOT,),
+        zug: Sequence[str] = ("puppet",),
+    ) -> None:
         """Make both sites.
 
         Args:
             folder: an empty folder for their data.
             way: first port of a relay, by which zug reaches bern; None for the direct way.
+            bern: robots of bern.
+            zug: robots of zug.
         """
-        self.bern = Site(folder / "bern", ROBOT)
-        self.zug = Site(folder / "zug", "puppet")
+        self.bern = Site(folder / "bern", *bern)
+        self.zug = Site(folder / "zug", *zug)
         self.port = free_pair()
         listen, address = f"127.0.0.1:{self.port}", f"127.0.0.1:{way or self.port}"
         self.bern.command("fleet", "init", "lab", "--site", "bern", "--listen", listen)
@@ -97,11 +115,11 @@ class TwoSites:
             if site.process is not None:
                 site.kill()
 
-    async def far(self) -> RemoteRobot:
-        """Return the robot as seen from zug, as soon as zug can reach it."""
+    async def far(self, robot: str = ROBOT) -> RemoteRobot:
+        """Return a robot of bern as seen from zug, as soon as zug can reach it."""
         end_s = time.monotonic() + WAIT_S
         while True:
-            opening = self.zug.open(f"{ROBOT}@bern")
+            opening = self.zug.open(f"{robot}@bern")
             try:
                 robot = await opening.__aenter__()
             except UrcError:

@@ -77,6 +77,10 @@ def test_one_visitor_has_a_bounded_number_of_seats_at_a_robot(
     [
         ("POST", "/api/v1/robots/puppet/stop", True),
         ("POST", "/api/v1/robots/my%20robot/stop", True),
+        ("POST", "/api/v1/stop", True),
+        ("POST", "/fleet/stop", True),
+        ("GET", "/api/v1/stop", False),
+        ("POST", "/api/v1/stop/more", False),
         ("GET", "/api/v1/robots/puppet/stop", False),
         ("POST", "/api/v1/robots/puppet/stop/more", False),
         ("POST", "/api/v1/robots/puppet/settings", False),

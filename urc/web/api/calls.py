@@ -16,6 +16,7 @@ from urc.web.alarms.wire import (
     ShelveAsked,
     UnshelveAsked,
 )
+from urc.web.api.stop_wire import StopAnswer, StopAsked
 from urc.web.api.wire import (
     CommandAnswer,
     CommandAsked,
@@ -211,6 +212,17 @@ CALLS: Final[tuple[Call, ...]] = (
         StopResult,
         method="POST",
         errors=(409, 429),
+    ),
+    Call(
+        "stop_several",
+        "/api/v1/stop",
+        ANYONE,
+        "Stop several robots at once, also of other sites, and latch their STOPs. The reply arrives"
+        " within 1 s and contains the result of each robot.",
+        StopAnswer,
+        StopAsked,
+        "POST",
+        errors=(404,),
     ),
     Call(
         "controls",

@@ -14,6 +14,7 @@ from urc.runtime.contact_times import NO_CONTACT, ContactTimes
 from urc.runtime.hub import LinkState, LinkStatus
 from urc.web.api.overview import active_alarms, battery_of, battery_signal
 from urc.web.api.readings import plain
+from urc.web.api.stop import can_stop
 from urc.web.api.wire import (
     ArgumentInfo,
     CommandInfo,
@@ -65,6 +66,8 @@ def summary(
         alarms=active_alarms(name, service),
         used_at=times.used_at,
         seen_at=times.seen_at,
+        can_stop=can_stop(service),
+        confirmed=service.controls.controller.is_certain,
     )
 
 

@@ -110,6 +110,10 @@ class RobotSummary(ApiMessage, frozen=True):
     """Time of the last use by a page or program, in seconds since 1970 (UTC)."""
     seen_at: float | None = None
     """Last time at which a connection to the robot was live, in seconds since 1970 (UTC)."""
+    can_stop: bool = False
+    """Whether the STOP of several robots includes the robot: it can move and has all settings."""
+    confirmed: bool = False
+    """Whether the robot has confirmed its last stop."""
 
 
 class SiteState(ApiMessage, frozen=True):

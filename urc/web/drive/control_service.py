@@ -321,17 +321,18 @@ class ControlService:
             case wire.Drive():
                 self._drive(operator, said)
 
-    def stop(self, by: str, who: Operator | None = None) -> None:
+    def stop(self, by: str, who: Operator | None = None, stop_id: str = "") -> None:
         """Stop the robot and latch STOP. A stop is never refused.
 
         Args:
             by: name of the person or page, shown on all pages.
             who: the person or page in the audit log; None for a stop by URC itself.
+            stop_id: identifier of the STOP of several robots in the audit log; "" for one robot.
         """
         for operator in self._operators.values():
             for command in list(operator.alarms):
                 operator.forget(command)
-        with self.recorder.caused_by(who):
+        with self.recorder.caused_by(who, stop_id):
             self.controller.stop(by)
         self.once.stopped()
 

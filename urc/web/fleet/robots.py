@@ -339,10 +339,10 @@ class RobotService:
         if isinstance(seen, bytes):
             self._last_picture = seen if len(seen) <= PICTURE_BYTES else None
 
-    async def deliver_stop(self) -> bool:
-        """Wait for at most `STOP_WITHIN_S` seconds; return whether the stop is certain."""
+    async def deliver_stop(self, within_s: float = STOP_WITHIN_S) -> bool:
+        """Wait for at most `within_s` seconds; return whether the stop is certain."""
         controller = self.controls.controller
-        end_s = self.clock.now() + STOP_WITHIN_S
+        end_s = self.clock.now() + within_s
         with self.visit():
             while not controller.is_certain and self.clock.now() < end_s:
                 if controller.is_confirmed and not controller.has_own_stop:

@@ -21,11 +21,11 @@ KNOWN_PLACES = 256
 """Maximum number of concurrent requests and sockets of one known person, device or program. The
 limit is high, because a known visitor may watch many robots."""
 
-_STOP = re.compile(r"/api/v1/robots/[^/ ]+/stop")
+_STOP = re.compile(r"/api/v1/(?:robots/[^/ ]+/)?stop|/fleet/stop")
 
 
 def is_stop(method: str, path: str) -> bool:
-    """Return whether a request stops a robot."""
+    """Return whether a request stops robots."""
     return method == "POST" and _STOP.fullmatch(path) is not None
 
 

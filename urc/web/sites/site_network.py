@@ -33,6 +33,7 @@ from urc.web.sites.gateway import Gateway
 from urc.web.sites.member import Member
 from urc.web.sites.member_routes import MemberRoutes
 from urc.web.sites.site_client import SiteClient
+from urc.web.sites.site_stops import SiteStops
 from urc.web.sites.site_watch import SiteWatch
 from urc.web.sites.visit_log import VisitLog
 
@@ -100,6 +101,7 @@ class SiteNetwork:
         self._lines = Lines(bus, self.door.accept)
         self.client = SiteClient(self._lines, keys.client_context, keys.peer)
         self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version))
+        self.stops = SiteStops(self.client)
         self._lines.on_sites = self._sites_changed
         self._present: frozenset[str] = frozenset()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -225,5 +227,6 @@ class SiteNetwork:
         finally:
             for task in (*tasks, *self._tasks):
                 task.cancel()
+            await self.stops.close()
             self._lines.close()
             await self._bus.close()
