@@ -467,6 +467,7 @@ class _Routes:
             ways=self.ways,
             drivers=drivers,
             broken=self.fleet.broken if visitor.may(MAINTAIN_SERVER) else {},
+            stoppable=sum(one.can_stop for one in states.robots),
         )
         return HTMLResponse(html, headers=_PAGE)
 

@@ -150,6 +150,8 @@ class MenuPage:
     """States of the robots, in the format of the API call ``/api/v1/robots``."""
     is_emulated: bool
     """Whether all of several robots are emulated, so that one mark serves all cards."""
+    has_stop_all: bool
+    """Whether the page has STOP ALL, because several robots can be stopped."""
 
 
 def menu_page(
@@ -161,6 +163,7 @@ def menu_page(
     drivers: Mapping[str, str] | None = None,
     broken: Mapping[str, BrokenRobot] | None = None,
     far: Sequence[FarRobot] = (),
+    stoppable: int = 0,
 ) -> str:
     """Return the menu.
 
@@ -172,6 +175,7 @@ def menu_page(
         drivers: installed package and version of each robot, keyed by robot name.
         broken: unusable robots, keyed by name.
         far: robots of other sites.
+        stoppable: number of robots that STOP ALL stops.
     """
     cards = [
         _card(name, robot, ways, (drivers or {}).get(name, "")) for name, robot in robots.items()
@@ -182,7 +186,7 @@ def menu_page(
     cards += [_far(one) for one in far]
     tags = tuple(sorted({tag for card in cards for tag in card.tags}))
     is_emulated = len(cards) > 1 and all(card.is_emulated for card in cards)
-    page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states, is_emulated)
+    page = MenuPage(head, Nav("menu", ways), tuple(cards), tags, states, is_emulated, stoppable > 1)
     return render("menu.html.j2", page)
 
 

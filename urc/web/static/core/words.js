@@ -62,6 +62,7 @@ const SENTENCES = [
   mark("screen {n}"),
   mark("screen {n} at {place}"),
   mark("somebody else"),
+  mark("a screen on this machine"),
 ];
 /** @type {Set<string>} */
 const PLAIN = new Set(SENTENCES.filter((text) => !text.includes("{")));

@@ -13,11 +13,14 @@
  * @property {boolean} connected whether a page or program uses the robot
  * @property {string} holder
  * @property {string} latched
+ * @property {boolean} confirmed whether the robot has confirmed its last stop
+ * @property {boolean} can_stop whether STOP ALL includes the robot
  * @property {Battery | null} battery
  * @property {{count: number, worst: "" | "low" | "medium" | "high"}} alarms
  * @property {number | null} seen_at in seconds since 1970
  *
  * @typedef {{words: string, tone: "" | "caution" | "bad"}} Said
+ * @typedef {"confirmed" | "latched" | "no-link" | "refused"} Result of STOP for one robot
  */
 import { SIGNS } from "../core/alarm_signs.js";
 import { ageText } from "../core/formatting.js";
@@ -75,9 +78,13 @@ export function batteryWords({ battery }) {
  * Return the name of the operator who drives or has stopped the robot.
  *
  * @param {Summary} robot
+ * @param {Result} [result] result of this page's last STOP for the robot
  * @returns {Said | null}
  */
-export function whoWords({ holder, latched }) {
+export function whoWords({ holder, latched, confirmed }, result) {
+  if (result === "no-link") return { words: t("▲ NO LINK"), tone: "bad" };
+  if (latched && confirmed) return { words: t("■ Stopped ✓ by {who}", { who: said(latched) }), tone: "bad" };
+  if (result === "confirmed") return { words: t("■ Stopped ✓"), tone: "bad" };
   if (latched) return { words: t("■ Stopped by {who}", { who: said(latched) }), tone: "bad" };
   return holder ? { words: t("{who} is driving", { who: said(holder) }), tone: "" } : null;
 }

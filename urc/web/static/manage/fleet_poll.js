@@ -14,7 +14,7 @@ const EVERY_MS = 2000;
 const FAILED_MS = 5000;
 
 /**
- * Call `take` with each response, and with null after a failure.
+ * Call `take` with each response, and with null after a failure. Return a function that polls at once.
  *
  * @param {(list: RobotList | null) => void} take
  */
@@ -41,4 +41,5 @@ export function followRobots(take) {
   document.addEventListener("visibilitychange", () => void go());
   addEventListener("online", () => void go());
   timer = setTimeout(go, EVERY_MS); // the page itself contains the first response
+  return go;
 }

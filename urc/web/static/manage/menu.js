@@ -1,6 +1,6 @@
 // @ts-check
 /**
- * The menu: the state of each robot on its card, the order of the cards, search and filters.
+ * The menu: the state of each robot on its card, the order of the cards, search, filters, STOP ALL.
  *
  * @typedef {import("./card_words.js").Summary} Summary
  * @typedef {import("./card_words.js").Said} Said
@@ -12,6 +12,7 @@ import { watchPictures } from "./card.js";
 import { followRobots } from "./fleet_poll.js";
 import { fits } from "./search.js";
 import { placeSheets } from "./sheets.js";
+import { StopAll } from "./stop_all.js";
 import { t } from "../core/words.js";
 
 /**
@@ -34,19 +35,38 @@ const title = document.title;
 /** Wanted order of the cards. @type {string[]} */
 let order = [];
 let touchedMs = -CALM_MS;
+/** @type {RobotList | null} */
+let newest = null;
+/** Poll the states at once. */
+let poll = () => Promise.resolve();
+const dock = document.querySelector("[data-stop-all]");
+const stopAll = dock instanceof HTMLElement ? new StopAll(dock, onStopped) : null;
+
+/** Show the results of STOP ALL on the cards, then ask for the new states. */
+function onStopped() {
+  if (newest) showAll(newest);
+  void poll();
+}
 
 /** @param {RobotList | null} news */
 function take(news) {
   if (root instanceof HTMLElement) root.dataset["stale"] = String(news === null);
   if (news === null) return; // without a server, the last states stay, greyed out
-  for (const robot of news.robots) {
-    const card = byName.get(robot.name);
-    if (card && "live" in card.dataset) show(card, robot, news.time);
-  }
+  newest = news;
+  stopAll?.follow(news.robots);
+  showAll(news);
   order = news.robots.map(({ name }) => name);
   count();
   find();
   sort();
+}
+
+/** @param {RobotList} news */
+function showAll(news) {
+  for (const robot of news.robots) {
+    const card = byName.get(robot.name);
+    if (card && "live" in card.dataset) show(card, robot, news.time);
+  }
 }
 
 /**
@@ -62,7 +82,7 @@ function show(card, robot, nowS) {
   put(card, "[data-link]", link);
   put(card, "[data-alarms]", alarmWords(robot));
   put(card, "[data-battery]", batteryWords(robot));
-  put(card, "[data-who]", whoWords(robot));
+  put(card, "[data-who]", whoWords(robot, stopAll?.results.get(robot.name)?.result));
 }
 
 /**
@@ -125,6 +145,8 @@ function find() {
     if (isShown) found += 1;
   }
   if (none instanceof HTMLElement) none.hidden = found > 0;
+  const shown = cards.filter((card) => !card.hidden).map((card) => card.dataset["robotCard"] ?? "");
+  stopAll?.choose(shown, typed.trim() === "" && filter === "" ? tag : "", found < cards.length);
 }
 
 /** Sort the cards, unless the page is currently in use. */
@@ -185,6 +207,6 @@ for (const event of ["pointerdown", "pointermove", "keydown", "wheel", "scroll"]
 restore();
 if (root instanceof HTMLElement) take(JSON.parse(root.dataset["states"] ?? "null"));
 find(); // the browser restores earlier input
-followRobots(take);
+poll = followRobots(take);
 watchPictures();
 placeSheets(t("Close"));
