@@ -326,7 +326,8 @@ class _Routes:
 
     def add_sites(self, network: SiteNetwork) -> None:
         """Add the robots of other sites."""
-        far = FarStops(network.stops, network.watch, self.recorder)
+        sites = network.client
+        far = FarStops(network.stops, network.watch, lambda: sites.sites, self.recorder)
         self.robot_calls.far = network.watch.summaries
         self.robot_calls.sites = network.watch.states
         self.stop_calls.far = FarRobots(network.watch.summaries, far.stop)

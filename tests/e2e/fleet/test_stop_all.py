@@ -105,6 +105,18 @@ async def test_a_tag_reaches_over_sites_and_a_site_is_a_tag(fleet: Fleet) -> Non
     assert set(found) == names(*PLACES)
 
 
+@pytest.mark.parametrize("asked", [{"all": True}, {"tags": ["carts"]}, {"tags": ["bern"]}])
+async def test_a_robot_that_is_new_at_its_site_stops_too(fleet: Fleet, asked: object) -> None:
+    """The list that zug has of bern may be old, so bern applies the choice itself."""
+    await fleet.listed()
+    fleet.zug.network.watch.sites["bern"].robots.clear()
+    found, said, _ = await fleet.stop(asked)
+    assert {name for name in found if name.endswith("@bern")} == names("bern")
+    assert set(found.values()) == {"confirmed"}
+    assert said["unknown_tags"] == []
+    assert await fleet.latched("bern") == ["this computer (zug)"] * 2
+
+
 async def test_an_absent_site_delays_no_other_and_is_stopped_later(fleet: Fleet) -> None:
     """Its robots have no link; after the network returns, URC repeats the STOP."""
     await fleet.listed()

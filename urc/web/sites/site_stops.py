@@ -7,7 +7,7 @@ none of the others. A repetition has the same identifier, so the site ignores it
 import asyncio
 import logging
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 import msgspec
 
@@ -18,8 +18,8 @@ from urc.web.sites.stop_routes import STOP, SiteStopAnswer, SiteStopAsked
 
 __all__ = ["ANSWER_S", "SiteStops"]
 
-ANSWER_S: Final = 0.9
-"""Longest wait for the reply of a site, in seconds."""
+ANSWER_S: Final = 0.75
+"""Longest wait for the reply of a site, in seconds; the rest of a second is for a busy server."""
 REPEAT_S: Final = 0.5
 """Pause before a repetition to a site that has not answered, in seconds."""
 REPEAT_ANSWER_S: Final = 5.0
@@ -29,6 +29,13 @@ _JSON: Final = ((b"content-type", b"application/json"),)
 log = logging.getLogger(__name__)
 
 _Late = Callable[[str, SiteStopAsked, SiteStopAnswer], None]
+
+
+class _Due(NamedTuple):
+    """A STOP that a site has not answered, and the callback for the reply to its repetition."""
+
+    asked: SiteStopAsked
+    on_late: _Late
 
 
 class SiteStops:
@@ -47,7 +54,7 @@ class SiteStops:
         self._client = client
         self._answer_s = answer_s
         self._repeat_s = repeat_s
-        self._due: dict[str, dict[str, SiteStopAsked]] = {}
+        self._due: dict[str, dict[str, _Due]] = {}
         """The newest unanswered STOP of each robot, by site and by the robot's name there."""
         self._ends_s: dict[str, float] = {}
         """Time at which the repetitions to a site end, on the loop's clock."""
@@ -70,7 +77,7 @@ class SiteStops:
             self._repeat(site, asked, on_late)
             raise
         due = self._due.get(site, {})
-        for name in asked.robots:
+        for name in _keys(asked):
             due.pop(name, None)  # this STOP is newer than each earlier one
         return answer
 
@@ -100,28 +107,40 @@ class SiteStops:
             raise SiteFailed(str(error)) from error
 
     def _repeat(self, site: str, asked: SiteStopAsked, on_late: _Late) -> None:
-        self._due.setdefault(site, {}).update(dict.fromkeys(asked.robots, asked))
+        self._due.setdefault(site, {}).update(dict.fromkeys(_keys(asked), _Due(asked, on_late)))
         self._ends_s[site] = asyncio.get_running_loop().time() + STOP_DUE_S
         if site not in self._tasks:
-            task = self._tasks[site] = asyncio.create_task(self._keep_asking(site, on_late))
+            task = self._tasks[site] = asyncio.create_task(self._keep_asking(site))
             task.add_done_callback(lambda _: self._tasks.pop(site, None))
 
-    async def _keep_asking(self, site: str, on_late: _Late) -> None:
+    async def _keep_asking(self, site: str) -> None:
         """Repeat unanswered STOPs until the site has answered, for at most `STOP_DUE_S` seconds."""
         loop = asyncio.get_running_loop()
         due = self._due[site]
         while due and loop.time() < self._ends_s[site]:
             await asyncio.sleep(self._repeat_s)
-            for asked in {one.id: one for one in due.values()}.values():
-                robots = {name: role for name, role in asked.robots.items() if due[name] is asked}
-                again = msgspec.structs.replace(asked, robots=robots)
-                try:
-                    answer = await self._ask(site, again, REPEAT_ANSWER_S)
-                except SiteFailed as fault:
-                    log.info("STOP is repeated: %s", fault)
+            for one in {one.asked.id: one for one in due.values()}.values():
+                if not await self._again(site, one, due):
                     break
-                for name in robots:
-                    if due.get(name) is asked:
-                        del due[name]
-                on_late(site, again, answer)
         self._due.pop(site, None)
+
+    async def _again(self, site: str, one: _Due, due: dict[str, _Due]) -> bool:
+        """Repeat a STOP for robots without a newer one; return whether the site has answered."""
+        roles = one.asked.robots.items()
+        robots = {name: role for name, role in roles if due.get(name) is one}
+        again = msgspec.structs.replace(one.asked, robots=robots)
+        try:
+            answer = await self._ask(site, again, REPEAT_ANSWER_S)
+        except SiteFailed as fault:
+            log.info("STOP is repeated: %s", fault)
+            return False
+        for name in _keys(again):
+            if due.get(name) is one:
+                del due[name]
+        one.on_late(site, again, answer)
+        return True
+
+
+def _keys(asked: SiteStopAsked) -> tuple[str, ...]:
+    """Return the robots that a STOP names; ("",) if the site itself chooses the robots."""
+    return tuple(asked.robots) or ("",)

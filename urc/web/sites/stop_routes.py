@@ -46,7 +46,13 @@ class SiteStopAsked(msgspec.Struct, frozen=True):
     robots: Annotated[dict[_Word, Role | None], msgspec.Meta(max_length=MAX_ROBOTS)]
     """The visitor's role for each robot, by the robot's name at this site."""
     who: SiteStopper
-    within_s: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.5
+    tags: Annotated[tuple[_Word, ...], msgspec.Meta(max_length=MAX_ROBOTS)] = ()
+    """Tags of further robots; this site knows its robots better than another site."""
+    all: bool = False
+    """Whether to stop all robots of this site that can move."""
+    role: Role | None = None
+    """The visitor's role for the robots that `tags` and `all` choose."""
+    within_s: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.4
     """Longest wait for the robots, in seconds."""
 
 
@@ -71,8 +77,12 @@ class StopRoutes:
         """Stop robots, and return the result of each robot."""
         asked = await body_of(request, SiteStopAsked)
         site = request.scope["state"]["site"].name
+        wanted = frozenset(asked.tags)
+        tags = self._stops.tags()
+        more = [one for one, own in tags.items() if asked.all or not wanted.isdisjoint(own)]
+        names = tuple(dict.fromkeys((*asked.robots, *more)))
         found = await self._stops.stop(
-            tuple(asked.robots), lambda name: _operator(asked, site, name), asked.id, asked.within_s
+            names, lambda name: _operator(asked, site, name), asked.id, asked.within_s
         )
         return answer(SiteStopAnswer(tuple(found)))
 
@@ -87,7 +97,7 @@ def _operator(asked: SiteStopAsked, site: str, robot: str) -> Operator:
     return Operator(
         "",
         name,
-        asked.robots[robot],
+        asked.robots.get(robot, asked.role),
         who=name,
         principal=principal,
         person=principal,

@@ -11,12 +11,12 @@ const WITHIN_MS = 30_000;
 /**
  * @param {string} path
  * @param {object | Blob} [body] JSON or raw body of a POST; without it the request is a GET
- * @param {number} [withinMs] time limit
+ * @param {RequestInit} [more] further options, such as another time limit
  * @returns {Promise<any>}
  */
-export async function ask(path, body, withinMs = WITHIN_MS) {
+export async function ask(path, body, more = {}) {
   /** @type {RequestInit} */
-  const how = { cache: "no-store", signal: AbortSignal.timeout(withinMs) };
+  const how = { cache: "no-store", signal: AbortSignal.timeout(WITHIN_MS), ...more };
   if (body instanceof Blob) {
     Object.assign(how, { method: "POST", body, headers: { "content-type": "application/octet-stream" } });
   } else if (body) {

@@ -15,6 +15,8 @@ import { t } from "../core/words.js";
 const URL_OF_STOP = "/api/v1/stop";
 /** Time limit of a request; the server replies within one second. */
 const WITHIN_MS = 3000;
+/** Number of robots up to which a request outlives its page; browsers limit the size of such a request. */
+const KEPT_ROBOTS = 200;
 /** Pause before a request that did not reach the server is sent again. */
 const AGAIN_MS = 1000;
 /** Time after which a resting finger counts as a tap. */
@@ -123,7 +125,10 @@ export class StopAll {
     while (number === this.number) {
       try {
         /** @type {{robots: RobotStop[]}} */
-        const said = await ask(URL_OF_STOP, { robots: names }, WITHIN_MS);
+        const said = await ask(URL_OF_STOP, { robots: names }, {
+          keepalive: names.length <= KEPT_ROBOTS,
+          signal: AbortSignal.timeout(WITHIN_MS),
+        });
         if (number !== this.number) return;
         this.results = new Map(said.robots.map((one) => [one.name, one]));
         this.phase = "";
