@@ -7,7 +7,13 @@ from urc.web.api.calls import CALLS
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "api.md").read_text("utf-8")
 ROWS = re.findall(r"^\| `(GET|POST) (/[^`]+)` \| ([^|]+?) \|$", PAGE, re.MULTILINE)
-ABOUT_ROBOTS = ("/api/v1/robots", "/api/v1/recordings", "/api/v1/audit", "/api/v1/stop")
+ABOUT_ROBOTS = (
+    "/api/v1/robots",
+    "/api/v1/recordings",
+    "/api/v1/audit",
+    "/api/v1/stop",
+    "/api/v1/commands",
+)
 
 
 def test_the_rights_on_the_page_are_those_of_the_calls() -> None:

@@ -40,6 +40,7 @@ from urc.web.access_page import AccessMiddleware
 from urc.web.alarms.notifier import AlarmNotifier
 from urc.web.alarms.routes import AlarmCalls
 from urc.web.api.calls import api_routes
+from urc.web.api.group_calls import FarCommands, GroupCalls
 from urc.web.api.recordings import RecordingCalls
 from urc.web.api.robots import RobotCalls
 from urc.web.api.stop_calls import FarRobots, StopCalls
@@ -95,6 +96,7 @@ from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
 from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, error_page, robot_page
 from urc.web.show.trust import TrustPages
+from urc.web.sites.far_commands import FarCommandCalls
 from urc.web.sites.far_stops import FarStops
 from urc.web.sites.robot_names import far_name
 from urc.web.sites.site_network import SiteNetwork
@@ -304,6 +306,10 @@ class _Routes:
     dev_start: DevStart | None = None
     network: SiteNetwork | None = None
     gallery: Gallery = field(init=False)
+    group_calls: GroupCalls = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.group_calls = GroupCalls(lambda: self.services, self.robot_calls)
 
     @property
     def robots(self) -> Mapping[str, Robot]:
@@ -331,6 +337,8 @@ class _Routes:
         self.robot_calls.far = network.watch.summaries
         self.robot_calls.sites = network.watch.states
         self.stop_calls.far = FarRobots(network.watch.summaries, far.stop)
+        runs = FarCommandCalls(network.client, network.watch, network.proofs)
+        self.group_calls.far = FarCommands(network.watch.summaries, runs.commands, runs.run)
 
     def with_calls(self) -> "list[_Part]":
         """Return the objects that provide both pages and API calls."""
@@ -354,6 +362,7 @@ class _Routes:
             "playback_move": self.move,
             **self.robot_calls.endpoints(),
             **self.stop_calls.endpoints(),
+            **self.group_calls.endpoints(),
             **self.alarm_calls.endpoints(),
             **self.recording_calls.endpoints(),
         }

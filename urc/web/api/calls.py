@@ -16,6 +16,7 @@ from urc.web.alarms.wire import (
     ShelveAsked,
     UnshelveAsked,
 )
+from urc.web.api.group_wire import GroupAnswer, GroupAsked
 from urc.web.api.stop_wire import StopAnswer, StopAsked
 from urc.web.api.wire import (
     CommandAnswer,
@@ -181,6 +182,17 @@ CALLS: Final[tuple[Call, ...]] = (
         "POST",
         errors=(409, 422, 424, 428, 429),
         is_body_needed=False,
+    ),
+    Call(
+        "group_command",
+        "/api/v1/commands",
+        SIGNED_IN,
+        "Run a confirmed command of several robots that declare it alike, also of other sites. Each"
+        " robot requires the role of the command.",
+        GroupAnswer,
+        GroupAsked,
+        "POST",
+        errors=(404, 409, 428),
     ),
     Call(
         "lease",

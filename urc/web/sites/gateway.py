@@ -9,13 +9,11 @@ import asyncio
 import logging
 from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import replace
-from typing import Final, Protocol
+from typing import Final
 from urllib.parse import quote
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from urc.fleet.assertion import SCHEME, Assertion
 from urc.fleet.bus import Lane
 from urc.web.feed.client_socket import SocketFlow
 from urc.web.serve.connection_quota import is_stop
@@ -24,9 +22,9 @@ from urc.web.serve.rights import WATCH, turn_away
 from urc.web.serve.visitor import Visitor
 from urc.web.sites.robot_names import FarName, far_query, far_target
 from urc.web.sites.site_client import SiteClient, SiteFailed, relayed
-from urc.web.sites.visit_log import VisitLog
+from urc.web.sites.visitor_proof import VisitorProofs
 
-__all__ = ["Gateway", "SignsAssertions"]
+__all__ = ["Gateway"]
 
 RENEW_S: Final = 10.0
 """Interval at which an open socket renews its visitor's assertion, in seconds."""
@@ -49,13 +47,6 @@ _HANDSHAKE: Final = (b"upgrade", b"sec-websocket-key", b"sec-websocket-version")
 log = logging.getLogger(__name__)
 
 
-class SignsAssertions(Protocol):
-    """The membership of this site, as the gateway uses it."""
-
-    def asserted(self, assertion: Assertion, site: str) -> str:
-        """Return an assertion for another site, signed by this site."""
-
-
 class Gateway:
     """ASGI middleware for robots of other sites."""
 
@@ -63,9 +54,8 @@ class Gateway:
         self,
         app: ASGIApp,
         client: SiteClient,
-        signer: SignsAssertions,
+        proofs: VisitorProofs,
         followed: Callable[[Callable[[], None]], AbstractContextManager[None]],
-        begun: VisitLog,
         refusal: Callable[[str], str],
     ) -> None:
         """Create the middleware.
@@ -73,18 +63,16 @@ class Gateway:
         Args:
             app: the application for everything else.
             client: requests to other sites.
-            signer: the membership of this site.
+            proofs: headers that tell the other site who acts.
             followed: function that takes a callback and returns a context. While the context is
                 open, the callback is called after each change of rights.
-            begun: identifiers of visits, and the audit log of this site.
             refusal: function that returns why another site is refused; "" if it is not. STOP is
                 always passed on.
         """
         self._app = app
         self._client = client
-        self._signer = signer
+        self._proofs = proofs
         self._followed = followed
-        self._begun = begun
         self._refusal = refusal
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -103,28 +91,8 @@ class Gateway:
 
     def _authorization(self, scope: Scope, far: FarName) -> tuple[bytes, bytes] | None:
         """Return the header with the visitor's assertion; None for a visitor without a role."""
-        visitor: Visitor = scope["state"]["visitor"]
-        role = visitor.role(str(far))
-        if role is None:
-            return None
-        if not visitor.may_give(""):
-            role = (
-                "watch"  # an assertion has no list of commands, so a limited token may only watch
-            )
-        who = visitor.identity
         client = scope.get("client") or ("",)
-        assertion = Assertion(
-            principal=who.principal or "visitor",
-            name=who.name or str(client[0]),
-            kind=who.kind or "guest",
-            sign_in=who.sign_in or str(client[0]) or "visitor",
-            robot=far.robot,
-            role=role,
-            place=str(client[0]),
-        )
-        visit = self._begun.sent(assertion, far, "key" if visitor.is_local else who.way)
-        assertion = replace(assertion, visit=visit)
-        return b"authorization", f"{SCHEME} {self._signer.asserted(assertion, far.site)}".encode()
+        return self._proofs.header(scope["state"]["visitor"], str(client[0]), far)
 
     # Requests
 

@@ -36,6 +36,7 @@ from urc.web.sites.site_client import SiteClient
 from urc.web.sites.site_stops import SiteStops
 from urc.web.sites.site_watch import SiteWatch
 from urc.web.sites.visit_log import VisitLog
+from urc.web.sites.visitor_proof import VisitorProofs
 
 __all__ = ["SiteKeys", "SiteNetwork"]
 
@@ -102,6 +103,8 @@ class SiteNetwork:
         self.client = SiteClient(self._lines, keys.client_context, keys.peer)
         self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version))
         self.stops = SiteStops(self.client)
+        self.proofs = VisitorProofs(self, self._visits)
+        """Headers that tell other sites who acts."""
         self._lines.on_sites = self._sites_changed
         self._present: frozenset[str] = frozenset()
         self._tasks: set[asyncio.Task[None]] = set()
@@ -170,7 +173,7 @@ class SiteNetwork:
 
     def around(self, app: ASGIApp, access: Access) -> ASGIApp:
         """Return the application with robots of other sites."""
-        return Gateway(app, self.client, self, access.followed, self._visits, self.watch.refusal)
+        return Gateway(app, self.client, self.proofs, access.followed, self.watch.refusal)
 
     def routes(self) -> list[ProtectedRoute]:
         """Return the routes about certificates for other sites."""
