@@ -10,7 +10,6 @@ from collections.abc import AsyncIterator, Collection, Mapping, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from http import HTTPStatus
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
@@ -50,6 +49,7 @@ from urc.web.dev.routes import Dev, dev_url, no_dev_routes
 from urc.web.dev.start import DevStart, no_dev_start
 from urc.web.dev.watch import Remake
 from urc.web.drive.redundant_socket import RedundantSocket
+from urc.web.error_handlers import ERROR_HANDLERS
 from urc.web.fleet.contact_watch import ContactWatch
 from urc.web.fleet.fleet import Fleet
 from urc.web.fleet.robot_factory import RobotFactory, RobotOptions
@@ -76,7 +76,7 @@ from urc.web.serve.access import Access
 from urc.web.serve.actors import record_admission, record_bad_token
 from urc.web.serve.certificates import Certificates
 from urc.web.serve.policy import Policy
-from urc.web.serve.replies import API, Endpoint, told
+from urc.web.serve.replies import Endpoint, told
 from urc.web.serve.rights import (
     DRIVE,
     LOCAL,
@@ -94,7 +94,7 @@ from urc.web.show.frame_document import FrameDocuments
 from urc.web.show.gallery import Gallery
 from urc.web.show.interfaces import KEPT, chosen
 from urc.web.show.menu import NavigationLinks, menu_page
-from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, error_page, robot_page
+from urc.web.show.pages import PageHead, RobotPageRequest, ServerParts, robot_page
 from urc.web.show.trust import TrustPages
 from urc.web.sites.far_commands import FarCommandCalls
 from urc.web.sites.far_stops import FarStops
@@ -265,7 +265,7 @@ class _Dashboard(Starlette):
                 *(dev.routes() if dev else no_dev_routes()),
                 *(() if routes.dev_start else no_dev_start()),
             ],
-            exception_handlers={HTTPException: _told, 404: _told, 405: _told, Exception: _broken},
+            exception_handlers=ERROR_HANDLERS,
             lifespan=routes.lifespan,
         )
 
@@ -586,26 +586,3 @@ class _Routes:
         if service is None:
             await websocket.close(wire.CLOSE_NO_ROBOT, "this server has no robot with that name")
         return name, service
-
-
-async def _told(request: Request, error: Exception) -> Response:
-    if not isinstance(error, HTTPException):
-        raise error
-    if request.url.path.startswith(API):
-        return told(error.status_code, error.detail)
-    standard = HTTPStatus(error.status_code).phrase
-    text = (
-        words.t("This page does not exist.")
-        if error.detail == standard == "Not Found"
-        else error.detail
-    )
-    html = error_page(request.state.nonce, error.status_code, text)
-    headers = {**_PAGE, **(error.headers or {})}
-    return HTMLResponse(html, status_code=error.status_code, headers=headers)
-
-
-async def _broken(request: Request, _: Exception) -> Response:
-    text = words.t("URC had an internal error. The server's log has the details.")
-    if request.url.path.startswith(API):
-        return told(500, text)
-    return HTMLResponse(error_page(request.state.nonce, 500, text), 500, headers=_PAGE)

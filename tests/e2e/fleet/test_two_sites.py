@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-import os
 import signal
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from tests.e2e.command_line import run
 from tests.e2e.dashboards import until
-from tests.e2e.fleet.two_sites import FAST, ROBOT, SLOW, WAIT_S, TwoSites, reaches
-from tests.e2e.processes import UrcProcess
+from tests.e2e.fleet.two_sites import FAST, ROBOT, SLOW, WAIT_S, Site, TwoSites, reaches
 from urc import __version__
 from urc.client.remote import RemoteRobot
 from urc.problems import UrcError
