@@ -36,6 +36,9 @@ class Rights:
     def may_give(self, command: str) -> bool:
         return True
 
+    def limit(self) -> str:
+        return ""
+
 
 class Scene:
     """A robot that is connected, and the sessions of programs."""

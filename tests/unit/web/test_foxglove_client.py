@@ -77,6 +77,9 @@ class ChangingRights:
     def may_give(self, command: str) -> bool:
         return True
 
+    def limit(self) -> str:
+        return ""
+
 
 class Viewer:
     """A client that is connected to the server of one fake robot."""

@@ -43,6 +43,9 @@ class Rights:
         """Return whether the scope contains a command."""
         return not self.commands or command in self.commands
 
+    def limit(self) -> str:
+        return ""
+
 
 def has_stopped(it: ControlsScene) -> bool:
     """Return whether only stops followed the first frame."""
