@@ -71,6 +71,8 @@ class ZenohBus(FleetBus):
         self._publishers: dict[tuple[str, Lane], Any] = {}
         self._declared: list[Any] = []
         """Subscribers and tokens, which end when nothing refers to them."""
+        self._alive: dict[Lane, frozenset[str]] = dict.fromkeys(LANES, frozenset())
+        """Sites whose tokens are alive on each lane."""
         self._seen: frozenset[str] = frozenset()
         self._joining: asyncio.Task[None] | None = None
         self._came: deque[Callable[[], None]] = deque(maxlen=MAX_WAITING)
@@ -85,7 +87,10 @@ class ZenohBus(FleetBus):
 
     @property
     def sites(self) -> frozenset[str]:
-        """Names of the other sites whose tokens are alive."""
+        """Names of the other sites that are present.
+
+        A site appears as soon as it is connected on both lanes, and is absent without control.
+        """
         return self._seen
 
     async def open(self) -> None:
@@ -127,7 +132,7 @@ class ZenohBus(FleetBus):
         """Put one message; the library drops it if its own queue stays full."""
         if len(body) > MAX_MESSAGE_BYTES:
             raise ValueError(f"a message has {len(body)} bytes; at most {MAX_MESSAGE_BYTES}")
-        if site not in self._seen:
+        if site not in self._seen or site not in self._alive[lane]:
             return False
         try:
             self._publisher(site, lane).put(body)
@@ -143,6 +148,7 @@ class ZenohBus(FleetBus):
         sessions, self._sessions = self._sessions, {}
         self._declared.clear()
         self._publishers.clear()
+        self._alive = dict.fromkeys(LANES, frozenset())
         self._seen = frozenset()
         for session in sessions.values():
             closing = self._loop.run_in_executor(None, session.close)
@@ -160,10 +166,10 @@ class ZenohBus(FleetBus):
             handler = zenoh.handlers.Callback(partial(self._message, lane), indirect=False)
             session = self._sessions[lane]
             self._declared.append(session.declare_subscriber(f"{root}/{lane}/{site}/*", handler))
-        live = self._sessions["control"].liveliness()
-        handler = zenoh.handlers.Callback(self._token, indirect=False)
-        watched = live.declare_subscriber(f"{root}/site/*", handler, history=True)
-        self._declared += [watched, live.declare_token(f"{root}/site/{site}")]
+            live = session.liveliness()
+            handler = zenoh.handlers.Callback(partial(self._token, lane), indirect=False)
+            watched = live.declare_subscriber(f"{root}/site/*", handler, history=True)
+            self._declared += [watched, live.declare_token(f"{root}/site/{site}")]
 
     def _message(self, lane: Lane, sample: Any) -> None:
         sender = _last(sample)
@@ -171,12 +177,12 @@ class ZenohBus(FleetBus):
             arrival = Arrival(sender, lane, sample.payload.to_bytes())
             self._hand_over(lambda: self.on_arrival(arrival))
 
-    def _token(self, sample: Any) -> None:
+    def _token(self, lane: Lane, sample: Any) -> None:
         import zenoh
 
         name, is_here = _last(sample), sample.kind == zenoh.SampleKind.PUT
         if len(name.encode()) <= MAX_SITE_BYTES:
-            self._hand_over(partial(self._site_seen, name, is_here))
+            self._hand_over(partial(self._site_seen, lane, name, is_here))
 
     def _hand_over(self, work: Callable[[], None]) -> None:
         self._came.append(work)
@@ -192,11 +198,14 @@ class ZenohBus(FleetBus):
         while self._came:
             self._came.popleft()()
 
-    def _site_seen(self, name: str, is_here: bool) -> None:
-        others = self._seen | {name} if is_here else self._seen - {name}
-        others -= {self.site}
-        if others != self._seen and self._sessions:
-            self._seen = others
+    def _site_seen(self, lane: Lane, name: str, is_here: bool) -> None:
+        others = self._alive[lane] | {name} if is_here else self._alive[lane] - {name}
+        self._alive[lane] = others - {self.site}
+        # Lanes connect at different times. A request to a site with one lane would be lost.
+        both = self._alive["control"] & self._alive["data"]
+        seen = (self._seen & self._alive["control"]) | both
+        if seen != self._seen and self._sessions:
+            self._seen = seen
             self.on_sites()
 
     def _publisher(self, site: str, lane: Lane) -> Any:

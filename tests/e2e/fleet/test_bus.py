@@ -1,8 +1,12 @@
 """What a fleet's network promises: the public fake and Zenoh pass the same dialogues."""
 
+import asyncio
+import json
 from collections.abc import AsyncIterator, Callable
+from typing import Any
 
 import pytest
+import zenoh
 
 from tests.e2e.dashboards import until
 from tests.e2e.ports import free_pair
@@ -156,6 +160,55 @@ async def test_other_fleets_on_the_same_router_are_not_seen() -> None:
     finally:
         for bus in (lab, mill, yard):
             await bus.close()
+
+
+def router(port: int) -> Any:
+    """Return a router without a site, as another program may run it."""
+    settings = {
+        "mode": "router",
+        "listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]},
+        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
+        "transport": {"shared_memory": {"enabled": False}},
+    }
+    return zenoh.open(zenoh.Config.from_json5(json.dumps(settings)))
+
+
+async def test_a_site_appears_only_when_both_of_its_lanes_are_connected() -> None:
+    """A request on the other lane would be lost; a present site stays, so it can be driven."""
+    port = free_pair()
+    place = (f"tcp/127.0.0.1:{port}",)
+    control, data = router(port), router(port + 1)
+    genf, zug = (ZenohBus(BusOptions("lab", name, connect=place)) for name in ("genf", "zug"))
+    try:
+        await genf.open()
+        await zug.open()
+        await until(lambda: genf.sites == {"zug"})
+        await asyncio.to_thread(data.close)
+        await until(lambda: not genf.send("zug", "data", b"list"))
+        assert genf.sites == {"zug"}
+        assert genf.send("zug", "control", b"stop")
+        await asyncio.to_thread(control.close)
+        await until(lambda: not genf.sites)
+        control = await asyncio.to_thread(router, port)
+        got: list[Arrival] = []
+        zug.on_arrival = got.append
+        root = "urc/fleet/1/lab/control/zug/genf"
+        probe = control.declare_publisher(root)
+
+        def arrives() -> bool:
+            probe.put(b"tick")
+            return bool(got)
+
+        await until(arrives)  # zug is connected again, on the control lane alone
+        assert genf.sites == frozenset()
+        data = await asyncio.to_thread(router, port + 1)
+        await until(lambda: genf.sites == {"zug"})
+        assert genf.send("zug", "data", b"list")
+    finally:
+        for bus in (genf, zug):
+            await bus.close()
+        for session in (control, data):
+            await asyncio.to_thread(session.close)
 
 
 async def test_an_endpoint_without_a_port_is_named() -> None:

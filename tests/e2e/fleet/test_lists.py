@@ -3,7 +3,7 @@
 import asyncio
 import json
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack
+from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import urc.client
 from tests.e2e.dashboards import until
 from tests.e2e.fleet.places import Place, keys_of, place
 from tests.e2e.transports.certificates import Authority
+from urc.fleet import lines
 from urc.runtime.open_profile import open_document
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot
@@ -54,15 +55,16 @@ class Sites:
             return found
 
 
-@pytest.fixture
-async def sites(tmp_path: Path) -> AsyncIterator[Sites]:
-    """Run the sites."""
-    authority, network = Authority(tmp_path), FakeFleetNetwork()
+@asynccontextmanager
+async def running(folder: Path, hangs: str = "") -> AsyncIterator[Sites]:
+    """Run the sites; the network loses all messages from and to the site `hangs`."""
+    authority, network = Authority(folder), FakeFleetNetwork()
+    network.loses = lambda sender, receiver, body: hangs in (sender, receiver)
     profile = open_document(shipped("robots") / f"{ROBOT}.yaml")
     async with AsyncExitStack() as stack:
         made = [
             await stack.enter_async_context(
-                place(network, keys_of(authority, name, tmp_path), *robots)
+                place(network, keys_of(authority, name, folder), *robots)
             )
             for name, robots in (
                 ("bern", [FakeRobot(profile)]),
@@ -71,6 +73,13 @@ async def sites(tmp_path: Path) -> AsyncIterator[Sites]:
             )
         ]
         yield Sites(network, *made)
+
+
+@pytest.fixture
+async def sites(tmp_path: Path) -> AsyncIterator[Sites]:
+    """Run the sites."""
+    async with running(tmp_path) as made:
+        yield made
 
 
 async def test_a_site_answers_a_known_list_when_it_changes(sites: Sites) -> None:
@@ -94,17 +103,14 @@ async def test_the_menu_follows_each_change(sites: Sites) -> None:
 
 
 async def test_a_site_that_hangs_delays_the_list_of_no_other(
-    sites: Sites, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Genf is present, but does not answer; bern's list follows its robot all the same."""
     monkeypatch.setattr(site_client, "CONNECT_S", 60.0)
-    sites.network.loses = lambda sender, receiver, body: "genf" in (sender, receiver)
-    sites.zug.network.watch.sites.clear()
-    sites.network.cut("zug", "bern")
-    sites.network.cut("zug", "genf")
-    sites.network.heal()
-    await sites.until_state("idle")
-    async with urc.client.open(sites.bern.url, ROBOT, token=sites.bern.access.key):
-        await sites.until_state("live")
-    assert "genf" in sites.zug.network.client.sites
-    assert "genf" not in sites.zug.network.watch.sites, "the request to genf is over"
+    monkeypatch.setattr(lines, "STALL_S", 60.0)
+    async with running(tmp_path, hangs="genf") as sites:
+        await sites.until_state("idle")
+        async with urc.client.open(sites.bern.url, ROBOT, token=sites.bern.access.key):
+            await sites.until_state("live")
+        assert "genf" in sites.zug.network.client.sites
+        assert "genf" not in sites.zug.network.watch.sites, "the request to genf is over"
