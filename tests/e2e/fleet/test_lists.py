@@ -18,7 +18,7 @@ from urc.runtime.open_profile import open_document
 from urc.shipped import shipped
 from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
-from urc.web.sites import site_client
+from urc.web.sites import site_client, site_watch
 
 pytestmark = pytest.mark.anyio
 ROBOT = "turtlebot4"
@@ -114,3 +114,20 @@ async def test_a_site_that_hangs_delays_the_list_of_no_other(
             await sites.until_state("live")
         assert "genf" in sites.zug.network.client.sites
         assert "genf" not in sites.zug.network.watch.sites, "the request to genf is over"
+
+
+async def test_a_failed_request_is_repeated_soon(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One lost message ends a request; the menu does not wait for the longest pause."""
+    monkeypatch.setattr(site_watch, "LOOK_S", 60.0)
+    async with running(tmp_path) as sites:
+        await sites.until_state("idle")
+        left = ["one message"]
+        sites.network.loses = lambda sender, receiver, body: (
+            (sender, receiver) == ("bern", "zug") and bool(left) and left.pop() != ""
+        )
+        await until(lambda: not left)
+        sites.network.loses = lambda sender, receiver, body: False
+        async with urc.client.open(sites.bern.url, ROBOT, token=sites.bern.access.key):
+            await sites.until_state("live")

@@ -38,9 +38,10 @@ __all__ = ["KnownSite", "SiteWatch"]
 PAUSE_S: Final = 0.2
 """Pause between two requests for the list of a site while a menu is open, in seconds."""
 LOOK_S: Final = 2.0
-"""The same after a failed request, and for a site that does not wait for a change, in seconds."""
+"""Longest pause after failed requests, and for a site that does not wait for a change, in seconds.
+Each of these pauses is twice as long as the one before."""
 MOST_RETRY_S: Final = 60.0
-"""Longest interval between two requests to a site that refuses its list, in seconds."""
+"""The same while no menu is open, for a site that refuses its list."""
 WATCHED_S: Final = 10.0
 """Time after a look at the menu during which lists are requested, in seconds."""
 FOLDER: Final = "documents"
@@ -167,12 +168,13 @@ class SiteWatch:
 
         A site that refuses its list is asked less and less while no menu is open.
         """
-        mark, retry_s = "", LOOK_S
+        mark, pause_s, retry_s = "", PAUSE_S, LOOK_S
         while True:
             mark = await self._ask(site, mark)
             has_failed = bool(self._known[site].fault)
+            pause_s = PAUSE_S if mark else min(2 * pause_s, LOOK_S)
             retry_s = min(2 * retry_s, MOST_RETRY_S) if has_failed else LOOK_S
-            await asyncio.sleep(PAUSE_S if mark else LOOK_S)
+            await asyncio.sleep(pause_s)
             if self._clock() - self._looked_s >= WATCHED_S:
                 mark = ""
                 self._looks.clear()
