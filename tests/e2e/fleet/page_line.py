@@ -2,7 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
 
@@ -100,7 +100,7 @@ class PageLine:
                 await self.tick(speed)
                 await asyncio.sleep(TICK_S)
 
-    async def until(self, is_true: Any) -> None:
+    async def until(self, is_true: Callable[[dict[str, Any]], bool]) -> None:
         """Wait until `is_true` returns True for the lease."""
         async with asyncio.timeout(WAIT_S):
             while not is_true(self.lease):
