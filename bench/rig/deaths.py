@@ -44,16 +44,30 @@ transports:
   wire: {{ type: {kind}, host: {host}, port: {port}, framing: {{ type: {framing} }} }}
 commands:
   go:
-    send: "M {{{{ t }}}}"
-    args: {{ t: {{ type: integer, min: 0 }} }}
-    hold: {{ repeat: 50ms, lease: 250ms, release: {{ t: 0 }}, watchdog: none }}
+{command}
+    hold: {{ repeat: 50ms, lease: 250ms, release: {release}, watchdog: none }}
 """
+_SPEED = """\
+    send: "M {{ t }}"
+    args: { t: { type: integer, min: 0 } }"""
+_MARK = """\
+    send: "M {{ 0 if t < 0 else t }}"
+    args: { t: { type: integer, min: -1, default: -1 } }"""
 
 
-def robot_profile(index: int, host: str, port: int, kind: str = "tcp") -> str:
-    """Return the document of a robot in the rig; ``M TIME`` moves the robot, ``M 0`` stops it."""
+def robot_profile(
+    index: int, host: str, port: int, kind: str = "tcp", *, is_speed: bool = True
+) -> str:
+    """Return the document of a robot in the rig; ``M TIME`` moves the robot, ``M 0`` stops it.
+
+    Without `is_speed`, the time is no speed, so a slow link does not change it.
+    """
     framing = "delimiter, tx: LF, rx: LF" if kind == "tcp" else "datagram"
-    return _PROFILE.format(index=index, kind=kind, host=host, port=port, framing=framing)
+    command, release = (_SPEED, "{ t: 0 }") if is_speed else (_MARK, "{}")
+    return _PROFILE.format(
+        index=index, kind=kind, host=host, port=port, framing=framing, command=command,
+        release=release,
+    )  # fmt: skip
 
 
 class Trial(NamedTuple):

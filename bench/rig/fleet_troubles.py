@@ -135,7 +135,9 @@ class FleetRig:
         self.robots = enter(Robots(["tcp:127.0.0.1:0"] * len(SITES)))
         self.sites = {
             node: FleetSite(
-                name, folder / name, [robot_profile(index, "127.0.0.1", self.robots.ports[index])]
+                name,
+                folder / name,
+                [robot_profile(index, "127.0.0.1", self.robots.ports[index], is_speed=False)],
             )
             for index, (node, name) in enumerate(SITES.items())
         }

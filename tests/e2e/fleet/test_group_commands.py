@@ -12,7 +12,6 @@ from tests.e2e.transports.certificates import Authority
 from urc.runtime.open_profile import open_document
 from urc.testing.dashboard import FakeRobot
 from urc.testing.fleet_bus import FakeFleetNetwork
-from urc.web.sites.site_network import SitePolicy
 
 pytestmark = pytest.mark.anyio
 
@@ -62,9 +61,9 @@ class Fleet:
 async def open_fleet(
     folder: Path,
     most: str = "9",
-    policy: SitePolicy = SitePolicy(),  # noqa: B008 - immutable
+    rules: str = "",
 ) -> AsyncIterator[Fleet]:
-    """Run both sites; `most` is the highest level of bern's lights."""
+    """Run both sites with the rules; `most` is the highest level of bern's lights."""
     authority, network = Authority(folder), FakeFleetNetwork()
     carts, places = {}, {}
     async with AsyncExitStack() as stack:
@@ -75,7 +74,7 @@ async def open_fleet(
             carts[site] = FakeRobot(open_document(file))
             keys = keys_of(authority, site, folder)
             places[site] = await stack.enter_async_context(
-                place(network, keys, carts[site], policy=policy)
+                place(network, keys, carts[site], rules=rules)
             )
         zug = places["zug"]
         await zug.ask("/api/v1/robots")
@@ -98,7 +97,7 @@ async def test_an_absent_site_is_named_and_the_others_run_it(tmp_path: Path) -> 
 
 
 async def test_the_site_of_a_robot_decides_on_the_right(tmp_path: Path) -> None:
-    async with open_fleet(tmp_path, policy=SitePolicy(role="watch")) as fleet:
+    async with open_fleet(tmp_path, rules="otherwise: watch") as fleet:
         assert await fleet.results() == {"cart": "", "cart@bern": "forbidden"}
         assert fleet.sent() == {"zug"}
 
