@@ -42,7 +42,7 @@ from urc.model.driver import Argument, Command
 from urc.model.exchange import Confirm
 from urc.model.interface import Interface, Layout, Slot, Tab, WidgetUse
 from urc.model.payload import WriteSpec
-from urc.model.values import Signal, Value
+from urc.model.values import AlarmLimits, Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.movers import FakeMotionBackend
@@ -204,27 +204,32 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
         assert await is_on_top(page, "[data-stop-button]")
 
 
-async def test_a_button_leads_to_the_widgets_that_a_small_screen_lacks(
+async def test_a_button_lists_the_widgets_that_a_small_screen_lacks_and_leads_to_them(
     new_page: PageMaker,
 ) -> None:
-    """Only screens that lack widgets show it. Each switch releases held controls."""
+    """Only screens that lack widgets show it. Each change of the page releases held controls."""
     grids = {"landscape": row("left", "right", "up"), "phone_landscape": row("left")}
     async with driven(robot=steered(Interface("x", "X", grids))) as (robot, address):
         page = await opened(new_page, address)
-        more = page.get_by_role("button", name="More widgets")
+        more = page.locator("[data-rest]")
         await expect(more).to_be_hidden()
         await turned(page, PHONE_LYING)
         await expect(page.locator(UP)).to_be_hidden()
         await expect(more).to_have_attribute("aria-pressed", "false")
-        await expect(more).to_have_attribute("title", re.compile(r"^\S.* \+1: 2 more widgets$"))
-        await expect(more).to_have_attribute("aria-label", re.compile(r" \+1: 2 more widgets$"))
+        await expect(more).to_have_text("+2")
+        await expect(more).to_have_attribute("title", "2 more widgets")
+        await expect(more).to_have_accessible_name("2 more widgets")
         await push(page)
         await robot.until_moving()
         await more.focus()
         await page.keyboard.press("Enter")
+        await page.locator("[data-rest-list]").get_by_role("button", name="Lift").focus()
+        await page.keyboard.press("Enter")
         await robot.until_stopped()
         await page.mouse.up()
         await expect(more).to_have_attribute("aria-pressed", "true")
+        await expect(more).to_have_accessible_name("Back")
+        await expect(page.locator("[data-rest-list]")).to_be_hidden()
         await expect(page.locator(LEFT)).to_be_hidden()
         await page.locator(UP).hover()
         await page.mouse.down()
@@ -238,6 +243,29 @@ async def test_a_button_leads_to_the_widgets_that_a_small_screen_lacks(
         await robot.until_moving()
         await page.mouse.up()
         await robot.until_stopped()
+
+
+async def test_the_button_for_missing_widgets_marks_those_with_an_alarm(
+    new_page: PageMaker,
+) -> None:
+    """The shape of the alarm's priority, at the button and before the widget's name."""
+    grids = {"landscape": row("a", "b", "c"), "phone_landscape": row("a")}
+    robot = gauged(Interface("x", "X", grids))
+    signals = {**robot.profile.driver.signals, "c": Signal("c", limits=AlarmLimits(hihi=4))}
+    driver = robot.profile.driver._replace(signals=signals)
+    robot = FakeRobot(robot.profile._replace(driver=driver))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        await turned(page, PHONE_LYING)
+        more = page.locator("[data-rest]")
+        await expect(more).to_have_text("+2")
+        robot.set_reading("c", 5, alarm="hihi")
+        await expect(more).to_have_text("+2▲")
+        await expect(more).to_have_accessible_name("2 more widgets · Alarm")
+        await more.click()
+        await expect(page.locator("[data-rest-list] > button")).to_have_text(["B", "▲ C"])
 
 
 async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> None:
@@ -352,7 +380,7 @@ GROUND = "[data-place='ground']"
 async def test_the_background_fills_the_stage_with_the_widgets_in_front(
     new_page: PageMaker,
 ) -> None:
-    """On a phone in portrait, only values are in front of its lower edge."""
+    """On a phone in portrait, values are lines directly below it, and nothing is in front of it."""
     grid = Layout(2, 3, (Slot("a", 0, 0), Slot("b", 1, 2)))
     async with running_dashboard(
         gauged(Interface("x", "X", {"landscape": grid}, background="c"))
@@ -371,14 +399,14 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
         for value in (B, C):
             assert await is_on_top(page, value)
             seen = await box(page, value)
-            assert back["y"] + back["height"] / 2 < seen["y"]
-            assert seen["y"] + seen["height"] < back["y"] + back["height"]
+            assert back["y"] + back["height"] <= seen["y"] < back["y"] + back["height"] + 100
+            assert seen["height"] == 32
 
 
-async def test_a_blurred_copy_surrounds_a_picture_that_does_not_fill_the_page(
+async def test_a_dimmed_copy_surrounds_a_picture_that_does_not_fill_the_page(
     new_page: PageMaker,
 ) -> None:
-    """It is dimmed, so it does not look like a part of the picture; only where there is room."""
+    """It does not look like a part of the picture, and fades out over the picture's edge."""
     signals = {"front": Signal("front", "image")}
     uses = [USES[0], WidgetUse("front", "camera", {"image": "front"})]
     profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))
@@ -390,14 +418,17 @@ async def test_a_blurred_copy_surrounds_a_picture_that_does_not_fill_the_page(
         await until(lambda: robot.is_open)
         robot.set_reading("front", plain(RED))
         await turned(page, PHONE_LYING)
-        await until_pixel(page, ".camera-surround", 0.1, 0.5, "r > 190 && g < 10 && b < 10")
+        await until_pixel(page, ".camera-surround", 0.1, 0.5, "r > 70 && r < 90 && g < 10")
+        await until_pixel(page, ".camera-surround", 0.99, 0.5, "a < 10")
         shot = Image.open(io.BytesIO(await page.locator(".camera-face").screenshot()))
         seen = shot.convert("RGB").getpixel((shot.width // 100, shot.height // 2))
         assert isinstance(seen, tuple)
         assert 40 < seen[0] < 120
         assert max(seen[1:]) < 40
-        await turned(page, (800, 660))
-        await expect(page.locator(".camera-surround")).to_be_hidden()
+        for filled in ((800, 660), PHONE):
+            await turned(page, filled)
+            for strip in await page.locator(".camera-surround").all():
+                await expect(strip).to_be_hidden()
 
 
 async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:

@@ -102,6 +102,15 @@ test("the badge tells a robot that cannot be opened from a server that is gone",
   assert.deepEqual(badgeOf(new Store(), socket({ failures: 1, refusal: "x" })), ["Cannot open", "bad"]);
 });
 
+test("only a robot that was connected is lost", () => {
+  const store = robot({ wire: "lost" });
+  assert.deepEqual(badgeOf(store, socket()), ["Not connected", "bad"]);
+  store.setLinks([...store.links.values()].map((link) => ({ ...link, state: "live" })), 0);
+  assert.deepEqual(badgeOf(store, socket()), ["Live", "good"]);
+  store.setLinks([...store.links.values()].map((link) => ({ ...link, state: "lost" })), 0);
+  assert.deepEqual(badgeOf(store, socket()), ["Robot lost", "bad"]);
+});
+
 test("a refusal names the program that the transport needs", () => {
   assert.deepEqual(causeWords("refused", "ros 127.0.0.1:9", "x"), {
     cause: "127.0.0.1:9 refuses the connection.", step: "Is rosbridge running?", isForeign: false,

@@ -3,6 +3,7 @@ import { test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { colour, palette, pixel } from "../../urc/web/static/widgets/colour_map.js";
 import { Rate, ageText, fileName, lookOf, place } from "../../widgets/camera/frame.js";
+import { strips } from "../../widgets/camera/surround.js";
 import { arrayField, paint, pixelAt, probe, rawField, readField } from "../../widgets/depth/field.js";
 import {
   Trail, bearingOf, distance, gridStep, headingText, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
@@ -269,12 +270,15 @@ test("a picture fits its box whichever way it is turned", () => {
   assert.deepEqual([filled.width, filled.height], [400, 100]);
 });
 
-test("a picture fills the page where it keeps nine tenths of itself; otherwise the picture is whole", () => {
+test("a picture fills the page where it keeps three quarters of itself; otherwise the picture is whole", () => {
   const look = { fit: /** @type {const} */ ("ground"), rotate: 0, mirror: false };
   const camera = { width: 400, height: 300 };
   // A tablet of nearly the same shape: filled, without some of the upper edge.
   const tablet = place(camera, { width: 1200, height: 830 }, look);
   assert.deepEqual([tablet.width, tablet.height, tablet.y + tablet.height / 2], [1200, 900, 830]);
+  // A desktop of 16:10: filled, it loses a fifth.
+  const desktop = place(camera, { width: 1440, height: 852 }, look);
+  allNear([desktop.width, desktop.height, desktop.y + desktop.height / 2], [1440, 1080, 852]);
   // A low phone: filled, it would lose half of its height, so the image is whole and the sides are its surround.
   const low = place(camera, { width: 844, height: 342 }, look);
   allNear([low.width, low.height, low.x, low.y], [456, 342, 422, 171]);
@@ -286,6 +290,19 @@ test("a picture fills the page where it keeps nine tenths of itself; otherwise t
   assert.deepEqual([lying.width, lying.height, lying.y], [400, 300, 180]);
   // As large as its box, the image is where it was.
   assert.equal(place(camera, { width: 800, height: 600 }, look).y, 300);
+});
+
+test("strips surround an image that does not fill the page, with a soft edge over the image", () => {
+  const page = { width: 844, height: 342 };
+  assert.equal(strips(page, { width: 844, height: 342 }), null);
+  assert.deepEqual(strips(page, { width: 456, height: 342 }), [
+    { left: 0, top: 0, width: 258, height: 342 },
+    { left: 586, top: 0, width: 258, height: 342 },
+  ]);
+  assert.deepEqual(strips({ width: 800, height: 1000 }, { width: 800, height: 600 }), [
+    { left: 0, top: 0, width: 800, height: 264 },
+    { left: 0, top: 736, width: 800, height: 264 },
+  ]);
 });
 
 test("a camera turns against the finger, never further than all the way", () => {

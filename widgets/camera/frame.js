@@ -3,7 +3,7 @@
  * The placement of an image in its box. Pure: no DOM.
  *
  * @typedef {"contain" | "cover" | "fill" | "ground"} Fit "ground": as "cover", but with the lower edge of the
- *   image; as "contain" if more than a tenth of the image were lost
+ *   image; as "contain" if more than a quarter of the image were lost
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -17,8 +17,8 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Maximum enlargement of an image that fills the background: nine tenths of the image stay visible. */
-const MOST_ZOOM = 1.1;
+/** Maximum enlargement of an image that fills the background: three quarters of the image stay visible. */
+const MOST_ZOOM = 4 / 3;
 
 /**
  * @param {Size} picture

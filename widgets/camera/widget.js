@@ -13,6 +13,7 @@ import { Surround } from "./surround.js";
 
 /** Whether the screen has room for signs only, such as a phone in landscape. */
 const isLow = () => matchMedia("(height < 30rem)").matches;
+const isUprightPhone = () => matchMedia("(width < 37.5rem)").matches;
 const LOOK_AGAIN_MS = 200;
 const FULL_COLOUR_MS = 5000;
 const KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
@@ -53,8 +54,7 @@ class Camera {
     this.canvas = canvas;
     this.cross = el.querySelector(".camera-cross");
     this.screen = new Screen(canvas);
-    const around = el.querySelector(".camera-surround");
-    this.surround = around instanceof HTMLCanvasElement ? new Surround(around) : null;
+    this.surround = new Surround([...el.querySelectorAll(".camera-surround")].filter((one) => one instanceof HTMLCanvasElement));
     this.look = {
       fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
       rotate: Number(options["rotate"] ?? 0),
@@ -78,7 +78,7 @@ class Camera {
         this.rate?.add(performance.now() / 1000);
         if (this.screen.show(bitmap)) this.draw();
         ctx.shown(picture);
-        this.surround?.follow(this.canvas, this.look);
+        this.surround.follow(this.canvas, this.look);
         if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },
@@ -218,7 +218,9 @@ class Camera {
   fit() {
     const { fit } = this.look;
     if (fit !== "auto") return fit;
-    return this.isGround() && !this.isWhole ? "ground" : "contain";
+    if (!this.isGround() || this.isWhole) return "contain";
+    // There, the widgets are below the picture, which takes the whole width.
+    return isUprightPhone() ? "cover" : "ground";
   }
 
   isGround() {
@@ -237,8 +239,8 @@ class Camera {
     style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
     const isLying = angle % Math.PI !== 0;
     const [wide, high] = isLying ? [height, width] : [width, height];
-    this.surround?.need(this.isGround() && (wide < size.width - 1 || high < size.height - 1));
-    this.surround?.follow(this.canvas, this.look);
+    this.surround.lay(size, this.isGround() ? { width: wide, height: high } : null);
+    this.surround.follow(this.canvas, this.look);
     // The crosshair marks the middle of the image.
     if (this.cross instanceof SVGElement) this.cross.style.transform = `translateY(${y - size.height / 2}px)`;
   }

@@ -36,6 +36,8 @@ export default {
     /** @type {readonly Link[]} */
     let links = [];
     let isReplay = false;
+    /** Whether any link has been connected; a robot that was never reached is not lost. */
+    let wasLive = false;
     /** Whether URC is reachable, but cannot open the robot. */
     let isRefused = false;
     let rate = { messages: NaN, bytes: NaN };
@@ -50,6 +52,7 @@ export default {
     });
     follow("links", (news) => {
       links = news.links;
+      wasLive ||= links.some(({ state }) => state === "live" || state === "silent");
       isRefused = news.isRefused ?? false;
       isReplay = news.isReplay ?? false;
       show();
@@ -77,7 +80,7 @@ export default {
       }
       const words = !isUp
         ? isRefused ? t("Cannot open") : t("No connection to URC")
-        : { lost: t("Robot lost"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
+        : { lost: wasLive ? t("Robot lost") : t("Not connected"), silent: t("Robot silent"), live: t("Live") }[worst ?? ""] ?? t("Connecting");
       // Hidden for a lost robot: operators could mistake the trip to URC for the trip to the robot.
       const trip = tripMs === null || worst !== "live" ? "" : ` · ${figure(tripMs)} ms`;
       write(now, `${SIGNS[sign]} ${words}${trip}`);

@@ -175,20 +175,44 @@ def phone_rules(*rows: str, **footprints: Footprint) -> str:
 VALUES: dict[str, Footprint] = {"a": "value", "b": "value", "c": "value", "d": "value"}
 
 
-def test_on_a_phone_in_portrait_the_first_values_are_over_the_background() -> None:
-    """The background keeps its space, and extends under them."""
+LINE = "--urc-cell-height:var(--urc-height-line)"
+
+
+def test_on_a_phone_in_portrait_the_first_values_are_lines_below_the_background() -> None:
+    """They cover nothing of the background; at most two rows are lines."""
     phone = phone_rules("a b", "go stop", go="button", stop="button", **VALUES)
-    assert '[data-place="ground"]{grid-row:1/3;--urc-ground-foot:calc(1*' in phone
+    assert '[data-place="ground"]{grid-row:1/2}' in phone
     assert '[data-place="1"]{display:grid;grid-area:2/1/3/2;' in phone
-    phone = phone_rules("a b", "c d", "go stop", go="button", stop="button", **VALUES)
-    assert '[data-place="ground"]{grid-row:1/4;--urc-ground-foot:calc(2*' in phone
-
-
-def test_on_a_phone_in_portrait_at_most_two_rows_of_values_are_over_the_background() -> None:
-    """More rows would hide the middle of the background, for example the robot on a map."""
+    assert phone.count(LINE) == 2
     values: dict[str, Footprint] = dict.fromkeys("abcdefgh", "value")
-    phone = phone_rules("a b", "c d", "e f", "g h", **values)
-    assert '[data-place="ground"]{grid-row:1/4;' in phone
+    assert phone_rules("a b", "c d", "e f", "g h", **values).count(LINE) == 4
+
+
+SMALL = "@media (max-width: 37.499rem) and (max-height: 45.999rem)"
+
+
+def test_on_a_small_phone_the_buttons_below_a_stick_are_next_to_it() -> None:
+    """The background gets their height; the button for missing slots leads to further views."""
+    slots = (
+        Slot("a", 0, 0), Slot("b", 0, 1), Slot("laser", 1, 0), Slot("map", 2, 0),
+        Slot("move", 1, 1, 2, 1), Slot("go", 3, 0), Slot("off", 3, 1),
+    )  # fmt: skip
+    kinds: dict[str, Footprint] = {"laser": "view", "map": "view", "move": "stick"}
+    buttons: dict[str, Footprint] = {"go": "button", "off": "button"}
+    names = [slot.name for slot in slots]
+    text = over(Layout(4, 2, slots), *names, **kinds, **buttons, **VALUES)
+    small = text.split(SMALL)[1]
+    for place, area in ((3, "3/1/4/2"), (5, "3/2/6/3"), (6, "4/1/5/2"), (7, "5/1/6/2")):
+        assert f'[data-place="{place}"]{{display:grid;grid-area:{area};' in small
+    assert '[data-place="4"]{display:none}' in small
+    assert "--urc-rest:4}" in text
+
+
+def test_a_small_phone_has_the_grid_of_a_phone_where_nothing_would_be_gained() -> None:
+    """As with two sticks, and without buttons below the stick."""
+    for rows in (["lift move", "lift move", "go off"], ["a move", "b move"]):
+        grid = phone_rules(*rows, lift="stick", move="stick", go="button", off="button", **VALUES)
+        assert SMALL not in grid
 
 
 def test_on_a_phone_in_portrait_controls_are_never_over_the_background() -> None:
@@ -332,21 +356,15 @@ def test_only_the_screens_that_lack_widgets_show_the_button_for_them() -> None:
         part.partition("{")[0].strip() for part in text.split("@media") if "inline-flex" in part
     ]
     assert set(shown) == {"(max-height: 29.999rem)"}
-    shows = 'display:inline-flex;--urc-rest-count:1;--urc-rest-first:"a";--urc-rest-others:""'
-    assert f"[data-rest]{{{shows}}}" in text
+    assert "[data-rest]{display:inline-flex;--urc-rest:0}" in text
     assert "[data-rest]" not in css(("landscape", wide), slots=("a", "b"))
 
 
-def test_the_button_names_the_first_missing_widget_and_counts_the_others() -> None:
-    """In reading order; a title of a document cannot end the style sheet."""
-    wide = Layout(1, 3, (Slot("a", 0, 0), Slot("b", 0, 1), Slot("c", 0, 2)))
+def test_the_button_has_the_numbers_of_the_missing_cells_in_reading_order() -> None:
+    wide = Layout(1, 3, (Slot("a", 0, 2), Slot("b", 0, 1), Slot("c", 0, 0)))
     low = Layout(1, 1, (Slot("b", 0, 0),))
-    screens = Interface("i", layouts={"landscape": wide, "phone_landscape": low})
-    titles = {"a": '"}</style>\\', "c": "Brake"}
-    text = grid_css(screens, ("a", "b", "c"), titles=titles)
-    assert "--urc-rest-count:2;" in text
-    assert r'--urc-rest-first:"\22 }\3c /style\3e \5c ";' in text
-    assert '--urc-rest-others:" +1"}' in text
+    text = css(("landscape", wide), ("phone_landscape", low), slots=("a", "b", "c"))
+    assert "[data-rest]{display:inline-flex;--urc-rest:2 0}" in text
 
 
 def test_a_complete_screen_stays_as_it_is_on_the_second_page() -> None:
@@ -392,7 +410,7 @@ def test_over_a_background_a_low_screen_has_a_drawer_for_what_it_lacks() -> None
     assert f'{second} [data-place="1"]{{display:none}}' in short.split("@media")[0]
     shown = f".urc-robot:has(> .urc-stage > {page}) [data-drawer-handle]{{display:inline-flex}}"
     assert f"@media (max-height: 29.999rem) and (min-width: 37.5rem){{{shown}}}" in text
-    assert "--urc-rest-count:1;" in text, "the button counts the view only"
+    assert "--urc-rest:2}" in text, "the button counts the view only"
 
 
 def test_only_a_background_leaves_room_for_a_drawer() -> None:

@@ -1,7 +1,7 @@
 """The CSS layout of an interface: the position of each cell for each kind of screen.
 
-Layer 5. Pure. The rules contain only numbers and escaped titles, so no text from a document can
-close the style element.
+Layer 5. Pure. The rules contain only numbers, so no text from a document can close the style
+element.
 
 A row or column without a slot is a margin. The margin keeps its position, at an eighth of the
 normal size. Phones show no margins. A phone in portrait shows the first available grid of
@@ -12,7 +12,8 @@ shows ``phone_landscape``, or else the rows of ``landscape`` with sticks, or all
 Over a background, each widget has the size of its footprint and is placed on its slot's side of the
 screen. Empty rows and columns fill the remaining space, where the background is visible. If a
 screen is too low, rows of values and displays shrink. On a phone in portrait, the background fills
-the space above the widgets; values in the first two rows cover its lower edge.
+the space above the widgets; values in the first two rows are low lines below it. On a small phone,
+buttons below a stick move next to it, in the place of further views.
 
 STOP is at the bottom centre of the screen. Widgets end above STOP, but sticks in the lower corners
 extend down next to STOP. Over a background, columns of buttons and values in the corners also
@@ -35,7 +36,9 @@ from urc.web.show.row_sizes import (
     MARGIN,
     OVER,
     PHONE,
+    PHONES,
     SHORT,
+    SMALL,
     USED_COLUMN,
     WINDOW,
     Canvas,
@@ -59,21 +62,17 @@ REST = "-rest"
 """Suffix of ``data-page`` while a small screen shows the slots that its grid lacks."""
 LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
-_COVER = "var(--urc-height-cover)"
-"""Height of a value in front of the background on a phone in portrait."""
-_GAP = "var(--urc-space-3)"
-"""Space between the rows of a grid over a background."""
+_LINE = "var(--urc-height-line)"
+"""Height of a value below the background on a phone in portrait."""
 _MOST_LOW = 3
 """Maximum number of rows next to a stick on a phone in landscape."""
 _SIDES = ("start", "center", "end")
-_ESCAPED = frozenset('"\\<>&\n\r\f\0')
 
 
 def grid_css(
     interface: Interface,
     slots: Sequence[str],
     footprints: Mapping[str, Footprint] = NOTHING,
-    titles: Mapping[str, str] = NOTHING,
 ) -> str:
     """Return the CSS rules for the cells, numbered in the order of `slots`.
 
@@ -81,7 +80,6 @@ def grid_css(
         interface: the interface.
         slots: names of the slots with widgets.
         footprints: footprint of each slot's widget.
-        titles: title of each slot's widget, for the button that shows the missing slots.
     """
     css = ""
     background = interface.background if interface.background in slots else ""
@@ -99,9 +97,9 @@ def grid_css(
         if any(_missing(grids, screen, canvas) for grids in (right, left) for screen in grids):
             css += _both_hands(rest, _rest(right, canvas), _rest(left, canvas), canvas)
             both = f":is({place},{rest})"
-            css += "".join(_button(both, right, titles, canvas))
+            css += "".join(_button(both, right, canvas))
             if left != right:
-                css += "".join(_button(both, left, titles, canvas, f"{LEFT_HAND} "))
+                css += "".join(_button(both, left, canvas, f"{LEFT_HAND} "))
     return css
 
 
@@ -147,44 +145,29 @@ def _rest(grids: Mapping[str, Layout], canvas: Canvas) -> dict[str, Layout]:
     """Return grids with the missing slots of each screen; a complete grid stays unchanged."""
     rest = dict(grids)
     for screen in grids:
-        columns = PHONE_COLUMNS if screen == PHONE else REST_COLUMNS
+        columns = PHONE_COLUMNS if screen in PHONES else REST_COLUMNS
         slots = tuple(
             Slot(slot.name, place // columns, place % columns)
             for place, slot in enumerate(_missing(grids, screen, canvas))
         )
         if slots:
-            free = int(bool(canvas.background) and screen != PHONE)
+            free = int(bool(canvas.background) and screen not in PHONES)
             rest[screen] = Layout(slots[-1].row + 1 + free, columns, slots)
     return rest
 
 
 def _button(
-    place: str,
-    grids: Mapping[str, Layout],
-    titles: Mapping[str, str],
-    canvas: Canvas,
-    hand: str = "",
+    place: str, grids: Mapping[str, Layout], canvas: Canvas, hand: str = ""
 ) -> Iterator[str]:
     """Yield the rules that show the button for the missing slots; see `_screens` for `hand`."""
     for screen in grids:
         missing = _missing(grids, screen, canvas)
         shown = "display:none"
         if missing:
-            first, others = missing[0].name, len(missing) - 1
-            shown = f"display:inline-flex;--urc-rest-count:{len(missing)}"
-            shown += f";--urc-rest-first:{_css_string(titles.get(first, first))}"
-            shown += f";--urc-rest-others:{_css_string(f' +{others}' if others else '')}"
+            cells = " ".join(str(canvas.slots.index(slot.name)) for slot in missing)
+            shown = f"display:inline-flex;--urc-rest:{cells}"
         rule = f"{hand}.urc-robot:has(> .urc-stage > {place}) [data-rest]{{{shown}}}"
         yield rule if screen == "base" else f"@media {screen}{{{rule}}}"
-
-
-def _css_string(text: str) -> str:
-    """Return text as a string literal for a style sheet.
-
-    All characters that could end the string or the sheet are escaped (CSS Syntax Level 3, section
-    4.3.7).
-    """
-    return '"' + "".join(f"\\{ord(one):x} " if one in _ESCAPED else one for one in text) + '"'
 
 
 def _left_hand(page: Tab, right: Mapping[str, Layout], canvas: Canvas) -> dict[str, Layout]:
@@ -234,7 +217,32 @@ def _placed(grids: Mapping[str, Layout], canvas: Canvas) -> dict[str, Layout]:
     if "phone_portrait" not in grids and phone.columns > PHONE_COLUMNS:
         phone = _stacked(phone)
     placed[PHONE] = phone
+    if (small := _compact(phone, canvas)) != phone:
+        placed[SMALL] = small
     return placed
+
+
+def _compact(grid: Layout, canvas: Canvas) -> Layout:
+    """Return the grid of a small phone in portrait, so that the background keeps its height.
+
+    The last row of buttons is next to the stick, in the place of all views but the first. A button
+    in the bar leads to the other views.
+    """
+    sticks = rows_of("stick", grid, canvas)
+    tall = [one for one in grid.slots if one.row_span > 1]
+    beside = [one for one in grid.slots if one.row in sticks and one.row_span == 1]
+    below = [one for one in grid.slots if one.row > max(sticks, default=grid.rows)]
+    kinds = [{canvas.footprints.get(one.name) for one in slots} for slots in (tall, beside, below)]
+    is_known = kinds == [{"stick"}, {"view"}, {"button"}] and grid.columns == PHONE_COLUMNS
+    if not (canvas.background and is_known and len(tall) == 1 and len(beside) > 1):
+        return grid
+    start, column = tall[0].row, beside[0].column
+    first = min(beside, key=lambda one: one.row)._replace(row=start)
+    ordered = sorted(below, key=lambda one: (one.row, one.column))
+    moved = [Slot(one.name, start + 1 + place, column) for place, one in enumerate(ordered)]
+    above = [one for one in grid.slots if one.row < start]
+    stick = tall[0]._replace(row_span=1 + len(moved))
+    return Layout(start + stick.row_span, grid.columns, (*above, first, stick, *moved))
 
 
 def _roomy(grid: Layout, canvas: Canvas) -> Layout:
@@ -292,16 +300,16 @@ def _filled(grid: Layout, names: Sequence[str]) -> Layout:
 def _rules(place: str, grid: Layout, canvas: Canvas, screen: str) -> Iterator[str]:
     yield f"{place}{{{_template(grid, canvas, screen)}}}"
     places = {slot.name: slot for slot in grid.slots}
-    is_below = screen == PHONE and bool(canvas.background)
-    covering = leading_values(grid, canvas) if is_below else 0
+    is_below = screen in PHONES and bool(canvas.background)
+    lines = leading_values(grid, canvas) if is_below else 0
     if is_below:
-        yield f'{place} [data-place="ground"]{{{_ground(covering)}}}'
+        yield f'{place} [data-place="ground"]{{grid-row:1/2}}'
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
             slot = places.get(name)
             rules = _place(slot, grid, canvas, is_below)
-            if slot and slot.row < covering:
-                rules += f";--urc-cell-height:{_COVER}"
+            if slot and slot.row < lines:
+                rules += f";--urc-cell-height:{_LINE}"
             if screen == SHORT and name in canvas.drawer and not place.endswith(f'{REST}"]'):
                 rules = "display:grid;grid-area:auto"
             yield f'{place} [data-place="{index}"]{{{rules}}}'
@@ -318,20 +326,11 @@ def _template(grid: Layout, canvas: Canvas, screen: str) -> str:
     column, empty_column = USED_COLUMN, MARGIN
     if canvas.background:
         empty_column = WINDOW
-        column = USED_COLUMN if screen == PHONE else OVER
+        column = USED_COLUMN if screen in PHONES else OVER
     used_columns = used_tracks((slot.column, slot.column_span) for slot in grid.slots)
     rows = " ".join(row_sizes(grid, canvas, screen)) or "none"
     columns = " ".join(tracks(grid.columns, used_columns, column, empty_column)) or "none"
     return f"grid-template-rows:{rows};grid-template-columns:{columns}"
-
-
-def _ground(covered: int) -> str:
-    """Return the rules for the background on a phone in portrait; values cover `covered` rows."""
-    area = f"grid-row:1/{2 + covered}"
-    if not covered:
-        return area
-    height = f"calc({covered}*({_COVER} + {_GAP}))"
-    return f"{area};--urc-ground-foot:{height};margin-block-end:calc(-.5*{_GAP})"
 
 
 def _corners(grid: Layout, canvas: Canvas) -> dict[str, str]:

@@ -205,7 +205,7 @@ def robot_page(
             title=profile.title,
             import_map=with_words(server.modules),
             widget_styles=_styles(profile, interface, uses, server.trust),
-            grid_css=grid_css(interface, slots, footprints, titles),
+            grid_css=grid_css(interface, slots, footprints),
         ),
         title=profile.title,
         url=url,

@@ -14,11 +14,14 @@ from urc.model.values import NOTHING
 from urc.model.widget import Footprint
 
 __all__ = [
-    "MARGIN", "OVER", "PHONE", "SHORT", "USED_COLUMN", "WINDOW", "Canvas", "is_corner",
-    "leading_values", "least_height", "row_sizes", "rows_of", "tracks", "used_tracks",
+    "MARGIN", "OVER", "PHONE", "PHONES", "SHORT", "SMALL", "USED_COLUMN", "WINDOW", "Canvas",
+    "is_corner", "leading_values", "least_height", "row_sizes", "rows_of", "tracks", "used_tracks",
 ]  # fmt: skip
 
 PHONE = "(max-width: 37.499rem)"
+SMALL = f"{PHONE} and (max-height: 45.999rem)"
+"""Small phones in portrait."""
+PHONES = (PHONE, SMALL)
 SHORT = "(max-height: 29.999rem)"
 USED_COLUMN, _USED_ROW, MARGIN = "minmax(0,1fr)", "minmax(8rem,1fr)", "minmax(0,.12fr)"
 _LOW_ROW = "minmax(6.5rem,1fr)"
@@ -31,9 +34,8 @@ _GROUND_ROW = "minmax(var(--urc-ground-height),1fr)"
 """Height of the background on a phone in portrait: all space above the widgets."""
 _PLAIN_GAP = "var(--urc-gap)"
 """Space between the rows of a plain grid."""
-_MOST_COVERED = 2
-"""Maximum number of rows of values over the background on a phone in portrait. More rows would hide
-the middle of the background, for example the robot on a map."""
+_MOST_LINES = 2
+"""Maximum number of rows of values that are low lines, on a phone in portrait."""
 _LOW_OVER = ("stick", "lever", "button", "value")
 """Footprints that extend down next to STOP over a background. Without a background, only sticks
 extend down next to STOP."""
@@ -83,7 +85,7 @@ def least_height(grid: Layout, canvas: Canvas, screen: str) -> str:
     over a background, and in a plain grid with sticks.
     """
     if canvas.background:
-        return "min-content" if screen == PHONE else _least_over(grid, canvas, screen)
+        return "min-content" if screen in PHONES else _least_over(grid, canvas, screen)
     if not rows_of("stick", grid, canvas):
         return "min-content"
     sizes = row_sizes(grid, canvas, screen)
@@ -135,29 +137,29 @@ def row_sizes(grid: Layout, canvas: Canvas, screen: str) -> list[str]:
     if canvas.background:
         row, empty_row = OVER, WINDOW
     used_rows = used_tracks((slot.row, slot.row_span) for slot in grid.slots)
-    if canvas.background and screen != PHONE and len(used_rows) == grid.rows:
+    if canvas.background and screen not in PHONES and len(used_rows) == grid.rows:
         used_rows = used_rows - {grid.rows // 2}  # no row is empty, so the middle row grows
     sizes = tracks(grid.rows, used_rows, row, empty_row)
     if canvas.background:
         sizes = _over_rows(grid, canvas, screen, sizes)
-    elif screen == PHONE:
+    elif screen in PHONES:
         is_low = [_kinds(place, grid, canvas) <= _HEIGHTS.keys() for place in range(grid.rows)]
         sizes = [_LOW_ROW if low else size for low, size in zip(is_low, sizes, strict=True)]
         sizes = _stick_heights(grid, canvas, sizes)
     else:
         sizes = _around_sticks(grid, canvas, sizes)
-    if canvas.background and screen == PHONE:
+    if canvas.background and screen in PHONES:
         sizes = [_GROUND_ROW, *sizes]
     return sizes
 
 
 def leading_values(grid: Layout, canvas: Canvas) -> int:
-    """Return the number of top rows that contain only values, at most `_MOST_COVERED`."""
+    """Return the number of top rows that contain only values, at most `_MOST_LINES`."""
     tall = used_tracks((slot.row, slot.row_span) for slot in grid.slots if slot.row_span > 1)
     is_value = [
         row not in tall and _kinds(row, grid, canvas) == {"value"} for row in range(grid.rows)
     ]
-    return min([*is_value, False].index(False), _MOST_COVERED)
+    return min([*is_value, False].index(False), _MOST_LINES)
 
 
 def _over_rows(grid: Layout, canvas: Canvas, screen: str, sizes: Sequence[str]) -> list[str]:
@@ -171,7 +173,7 @@ def _over_rows(grid: Layout, canvas: Canvas, screen: str, sizes: Sequence[str]) 
     lower = used_tracks((slot.row + 1, slot.row_span - 1) for slot in grid.slots)
     rows = []
     for place, size in enumerate(sizes):
-        if screen != PHONE and size == OVER and place not in firm:
+        if screen not in PHONES and size == OVER and place not in firm:
             size = _SOFT
         kinds = _kinds(place, grid, canvas)
         if place in lower and kinds and kinds <= _HEIGHTS.keys():

@@ -97,6 +97,11 @@ export class AlarmBook {
     return [...this.rows.values()].filter(({ state }) => state !== "shelved" && state !== "suppressed").sort(byUrgency);
   }
 
+  /** Return the priority of each annunciated active alarm, by its signal. */
+  active() {
+    return new Map(this.listed().filter(({ active }) => active).map(({ signal, priority }) => [signal, priority]));
+  }
+
   /** Shelved and suppressed alarms. */
   hidden() {
     return [...this.rows.values()].filter(({ state }) => state === "shelved" || state === "suppressed").sort(byUrgency);

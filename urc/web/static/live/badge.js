@@ -59,7 +59,8 @@ function summary(store, socket) {
   const name = links.length > 1 ? links.find((link) => link.state === worst)?.transport : t("Robot");
   switch (worst) {
     case "lost":
-      return ["bad", t("{name} lost", { name: name ?? "" })];
+      // A robot that was never reached is not lost.
+      return ["bad", store.wasLive ? t("{name} lost", { name: name ?? "" }) : t("Not connected")];
     case "silent":
       return ["caution", t("{name} silent", { name: name ?? "" })];
     case "live":
@@ -78,8 +79,8 @@ function summary(store, socket) {
 function tripOf(tripMs) {
   if (tripMs === null) return ["", ""];
   const figure = tripMs < SECONDS_FROM_MS ? `${Math.max(1, Math.round(tripMs))} ms` : `${Math.round(tripMs / 1000)} s`;
-  if (tripMs > POOR_MS) return ["bad", `▲ ${figure}`];
-  if (tripMs > CAUTION_MS) return ["caution", `◆ ${figure}`];
+  if (tripMs > POOR_MS) return ["bad", t("late {time}", { time: figure })];
+  if (tripMs > CAUTION_MS) return ["caution", t("late {time}", { time: figure })];
   return ["good", figure];
 }
 

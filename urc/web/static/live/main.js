@@ -175,7 +175,7 @@ const lost = new LostCard(part(root, "[data-lost]"), root, () => {
 });
 const screenName = new ScreenName((message) => socket.send(message));
 const wakeLock = new WakeLock(tell);
-const stage = new ViewSwitch(root, { store, run, input, asks, host, wake });
+const stage = new ViewSwitch(root, { store, run, input, asks, host, wake, book: alarms.book });
 /** JSON list of the images that the server sends. */
 let shown = "";
 

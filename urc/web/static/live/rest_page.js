@@ -1,68 +1,138 @@
 // @ts-check
 /**
- * The button for widgets that a small screen's grid lacks.
+ * The button for widgets that a small screen's grid lacks, with the list of their names.
  *
  * The end of the grid's page number selects them. The grid's rules place the cells, and show the
  * button only on screens that lack widgets: see `urc.web.show.layout`.
  */
 import { part } from "./badge.js";
+import { SIGNS } from "../core/alarm_signs.js";
+
+/** @typedef {import("../core/types.js").AlarmPriority} AlarmPriority */
 
 const REST = "-rest";
+/** @type {readonly AlarmPriority[]} */
+const WORST_FIRST = ["high", "medium", "low"];
 
-/**
- * @param {ParentNode} root
- * @param {ParentNode} stage
- * @param {() => void} leave called before each change of the page
- * @param {AbortSignal} signal
- */
-export function watchRest(root, stage, leave, signal) {
-  const button = part(root, "[data-rest]");
-  const grid = stage.querySelector(".urc-grid");
-  if (!(grid instanceof HTMLElement)) return; // the debug interface
-  const isRest = () => (grid.dataset["page"] ?? "").endsWith(REST);
-  const show = () => {
-    button.setAttribute("aria-pressed", String(isRest()));
-    name(button);
-  };
-  button.addEventListener(
-    "click",
-    () => {
-      leave();
-      const number = (grid.dataset["page"] ?? "0").replace(REST, "");
-      grid.dataset["page"] = isRest() ? number : number + REST;
-    },
-    { signal },
-  );
-  const changes = new MutationObserver(show); // a tab changes the page, too
-  changes.observe(grid, { attributeFilter: ["data-page"] });
-  signal.addEventListener("abort", () => changes.disconnect());
-  addEventListener("resize", show, { signal }); // another screen may lack other widgets
-  show();
+export class RestPage {
+  /**
+   * @param {ParentNode} root
+   * @param {ParentNode} stage
+   * @param {() => void} leave called before each change of the page
+   * @param {AbortSignal} signal
+   */
+  constructor(root, stage, leave, signal) {
+    this.button = part(root, "[data-rest]");
+    this.list = part(root, "[data-rest-list]");
+    this.stage = stage;
+    this.leave = leave;
+    const grid = stage.querySelector(".urc-grid");
+    this.grid = grid instanceof HTMLElement ? grid : null;
+    /** Cells that this screen's grid lacks, in reading order. @type {HTMLElement[]} */
+    this.cells = [];
+    /** Priority of the alarm of each signal. @type {ReadonlyMap<string, AlarmPriority>} */
+    this.alarms = new Map();
+    this.edition = -1;
+    if (!this.grid) return; // the debug interface
+    this.button.addEventListener("click", () => this.isRest && this.turn(), { signal });
+    const changes = new MutationObserver(() => this.show()); // a tab changes the page, too
+    changes.observe(this.grid, { attributeFilter: ["data-page"] });
+    signal.addEventListener("abort", () => {
+      changes.disconnect();
+      this.list.hidePopover();
+    });
+    addEventListener("resize", () => this.show(), { signal }); // another screen may lack other widgets
+    this.show();
+  }
+
+  get isRest() {
+    return (this.grid?.dataset["page"] ?? "").endsWith(REST);
+  }
+
+  /** Switch between both pages. */
+  turn() {
+    if (!this.grid) return;
+    this.leave();
+    const number = (this.grid.dataset["page"] ?? "0").replace(REST, "");
+    this.grid.dataset["page"] = this.isRest ? number : number + REST;
+  }
+
+  /** Mark widgets with an alarm. @param {import("../alarms/book.js").AlarmBook} book */
+  mark(book) {
+    if (!this.grid || book.edition === this.edition) return;
+    this.edition = book.edition;
+    this.alarms = book.active();
+    this.show();
+  }
+
+  show() {
+    const { button, list } = this;
+    const numbers = getComputedStyle(button).getPropertyValue("--urc-rest").split(" ").filter(Boolean);
+    this.cells = numbers.map((one) => this.stage.querySelector(`[data-cell="${one}"]`)).filter((el) => el instanceof HTMLElement);
+    const { restOne = "", restMany = "", restBack = "", restAlarm = "" } = button.dataset;
+    button.setAttribute("aria-pressed", String(this.isRest));
+    if (this.isRest) button.removeAttribute("popovertarget");
+    else button.setAttribute("popovertarget", list.id);
+    if (this.isRest || this.cells.length === 0) list.hidePopover();
+    const alarms = this.cells.map((cell) => worstOf(signalsOf(cell), this.alarms));
+    list.replaceChildren(...this.cells.map((cell, at) => this.item(cell, alarms[at] ?? "")));
+    const worst = this.isRest ? "" : WORST_FIRST.find((one) => alarms.includes(one)) ?? "";
+    button.toggleAttribute("data-alarm", worst !== "");
+    button.textContent = this.isRest ? "←" : `+${this.cells.length}${worst && SIGNS[worst]}`;
+    const count = String(this.cells.length);
+    const words = this.isRest ? restBack : count === "1" ? restOne : restMany.replace("{count}", count);
+    const title = worst ? `${words} · ${restAlarm}` : words;
+    button.title = title;
+    button.setAttribute("aria-label", title);
+  }
+
+  /**
+   * @param {HTMLElement} cell
+   * @param {AlarmPriority | ""} alarm
+   */
+  item(cell, alarm) {
+    const item = document.createElement("button");
+    item.type = "button";
+    item.className = "urc-button";
+    item.toggleAttribute("data-alarm", alarm !== "");
+    item.textContent = [alarm && SIGNS[alarm], titleOf(cell)].filter(Boolean).join(" ");
+    item.addEventListener("click", () => {
+      this.list.hidePopover();
+      this.turn();
+      cell.scrollIntoView({ block: "nearest" });
+      this.button.focus();
+    });
+    return item;
+  }
 }
 
 /**
- * Name the button “Attitude +3: 4 more widgets”, because the text in the bar comes from the style sheet.
+ * Return the worst alarm of some signals; "" without an alarm.
  *
- * @param {HTMLElement} button
+ * @param {readonly string[]} signals
+ * @param {ReadonlyMap<string, AlarmPriority>} alarms
+ * @returns {AlarmPriority | ""}
  */
-function name(button) {
-  const style = getComputedStyle(button);
-  const count = Number(style.getPropertyValue("--urc-rest-count"));
-  button.parentElement?.toggleAttribute("data-crowded", count > 0);
-  if (!count) return; // this screen has all widgets
-  const { restOne = "", restMany = "" } = button.dataset;
-  const seen = textOf(style.getPropertyValue("--urc-rest-first")) + textOf(style.getPropertyValue("--urc-rest-others"));
-  const title = `${seen}: ${count === 1 ? restOne : restMany.replace("{count}", String(count))}`;
-  button.title = title;
-  button.setAttribute("aria-label", title);
+export function worstOf(signals, alarms) {
+  return WORST_FIRST.find((one) => signals.some((signal) => alarms.get(signal) === one)) ?? "";
 }
 
-/**
- * Return the text of a string literal of the grid's rules: without quotes and escapes.
- *
- * @param {string} literal
- */
-function textOf(literal) {
-  const inside = literal.trim().slice(1, -1);
-  return inside.replace(/\\([0-9a-f]{1,6}) ?/gi, (_, digits) => String.fromCodePoint(parseInt(digits, 16)));
+/** @param {HTMLElement} cell */
+function configOf(cell) {
+  try {
+    return JSON.parse(cell.dataset["config"] ?? "{}");
+  } catch {
+    return {}; // the widget says its fault
+  }
+}
+
+/** @param {HTMLElement} cell */
+function titleOf(cell) {
+  const { title, slot } = configOf(cell);
+  return String(title || slot || "");
+}
+
+/** @param {HTMLElement} cell @returns {string[]} */
+function signalsOf(cell) {
+  return Object.values(configOf(cell).inputs ?? {}).flat().map(String);
 }

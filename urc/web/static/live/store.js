@@ -62,6 +62,8 @@ export class Store {
     this.links = new Map();
     /** Time of the loss of each lost link. @type {Map<string, number>} */
     this.downMs = new Map();
+    /** Whether any link has been connected since the page was opened. */
+    this.wasLive = false;
     this.isUp = false;
     /** Whether every link is connected, as a shortcut for checking each link. */
     this.isAllUp = false;
@@ -212,6 +214,7 @@ export class Store {
    */
   setLinks(links, nowMs) {
     this.links = new Map(links.map((link) => [link.transport, link]));
+    this.wasLive ||= links.some(({ state }) => isConnected(state));
     for (const { transport, state, since } of links) {
       if (isConnected(state)) this.downMs.delete(transport);
       // If a link is lost again while connecting, the first loss counts.

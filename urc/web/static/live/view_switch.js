@@ -10,6 +10,7 @@
  * @property {import("../widgets/host.js").Host} host
  * @property {Pick<import("../control/input.js").Input, "letGo" | "letGoIn" | "owns">} input
  * @property {() => void} wake
+ * @property {import("../alarms/book.js").AlarmBook} book
  */
 import { part } from "./badge.js";
 import { watchDrawer } from "./drawer.js";
@@ -17,7 +18,7 @@ import { keepFloatsFree } from "./floats.js";
 import { keepBarTools } from "./bar_tools.js";
 import { nextView, swapViews } from "./ground.js";
 import { Interfaces } from "./interfaces.js";
-import { watchRest } from "./rest_page.js";
+import { RestPage } from "./rest_page.js";
 import { tabsOf } from "./tabs.js";
 import { said, t } from "../core/words.js";
 
@@ -32,6 +33,8 @@ export class ViewSwitch {
     this.el = part(root, "[data-stage]");
     /** @type {Debug | null} */
     this.debug = null;
+    /** @type {RestPage | null} */
+    this.rest = null;
     /** Ends with the current interface. */
     this.ends = new AbortController();
     this.enter();
@@ -58,6 +61,7 @@ export class ViewSwitch {
   /** @param {number} nowMs */
   frame(nowMs) {
     this.debug?.frame(nowMs);
+    this.rest?.mark(this.doors.book);
   }
 
   /** Start the current interface. */
@@ -70,7 +74,7 @@ export class ViewSwitch {
     keepFloatsFree(this.el, this.ends.signal);
     const letGo = () => input.letGo(t("another page was opened"));
     tabsOf(this.el, letGo);
-    watchRest(this.root, this.el, letGo, this.ends.signal);
+    this.rest = new RestPage(this.root, this.el, letGo, this.ends.signal);
     watchDrawer(this.el, (drawer) => input.letGoIn(drawer, t("the drawer was closed")), this.ends.signal);
     const el = this.el.querySelector("[data-debug]");
     if (el instanceof HTMLElement) void this.search(el);
