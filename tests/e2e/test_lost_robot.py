@@ -170,8 +170,8 @@ SLACK = """() => {
 
 
 def lifting_robot(*views: WidgetUse) -> FakeRobot:
-    """Return a robot with values at the top, four controls below them, and views at the bottom."""
-    names = ("lift", "raise", "hoist", "heave")
+    """Return a robot with values at the top, five controls below them, and views at the bottom."""
+    names = ("lift", "raise", "hoist", "heave", "lower")
     lifts = [WidgetUse(one, "hold-button", {}, {"held": "lift"}) for one in names]
     robot = seeing_robot(*lifts, *views)
     rows = [Slot(one, 1 + row, 0) for row, one in enumerate((*names, *(v.slot for v in views)))]

@@ -335,6 +335,45 @@ def test_only_a_picture_that_is_stacked_asks_for_turning(
     assert needs_turning(page, ("a", "b", "c")) is is_turned
 
 
+def test_values_at_the_top_are_packed_at_the_sides() -> None:
+    """Wide widgets below them make no gap; a button ends the row; values further down stay."""
+    slots = (
+        Slot("a", 0, 0), Slot("b", 0, 1), Slot("go", 0, 2), Slot("c", 0, 4),
+        Slot("move", 1, 0), Slot("d", 3, 1),
+    )  # fmt: skip
+    kinds: dict[str, Footprint] = {"move": "stick", "go": "button"}
+    base = over(Layout(4, 5, slots), *(one.name for one in slots), **kinds, **VALUES)
+    base = base.split("@media")[0]
+    for place, side, shift in ((1, "start", 0), (2, "start", 1), (3, "start", 2), (4, "end", 0)):
+        rule = base.split(f'[data-place="{place}"]{{')[1].split("}")[0]
+        calc = f"calc({shift}*(var(--urc-width-tile) + var(--urc-gap)))"
+        margins = f"{calc} 0" if side == "start" else f"0 {calc}"
+        assert rule.endswith(f"grid-column:1/-1;--urc-across:{side};margin-inline:{margins}")
+    for place in (5, 6):
+        assert "1/-1" not in base.split(f'[data-place="{place}"]{{')[1].split("}")[0]
+
+
+LOW = "@media (max-height: 29.999rem){"
+
+
+def test_a_phone_in_landscape_shows_one_view() -> None:
+    """The view is the first one of the wide layout; the button in the bar lists the other one."""
+    slots = (
+        Slot("a", 0, 0), Slot("map", 1, 0), Slot("laser", 1, 1),
+        Slot("go", 3, 0), Slot("off", 3, 1), Slot("move", 0, 4, 4, 1),
+    )  # fmt: skip
+    wide = Layout(2, 5, (Slot("laser", 0, 3), Slot("map", 1, 3), *slots[3:5]))
+    kinds: dict[str, Footprint] = {"laser": "view", "map": "view", "move": "stick", "a": "value"}
+    kinds |= {"go": "button", "off": "button"}
+    names = ("v", *(slot.name for slot in slots))
+    layouts = {"landscape": wide, "phone_landscape": Layout(4, 5, slots)}
+    text = grid_css(Interface("i", layouts=layouts, background="v"), names, kinds)
+    low = text.split(LOW)[1].split("@media")[0]
+    assert '[data-place="2"]{display:none' in low
+    assert '[data-place="3"]{display:grid;grid-area:2/1/3/2;' in low
+    assert "--urc-rest:2}" in text
+
+
 REST = '.urc-grid[data-page="0-rest"]'
 
 

@@ -64,6 +64,8 @@ LEFT_HAND = ':root[data-hand="left"]'
 """Selector for left-handed layouts; ``handedness.js`` sets the attribute."""
 _LINE = "var(--urc-height-line)"
 """Height of a value below the background on a phone in portrait."""
+_PACK_GAP = "var(--urc-gap)"
+"""Space between values at the top of a page over a background."""
 _MOST_LOW = 3
 """Maximum number of rows next to a stick on a phone in landscape."""
 _SIDES = ("start", "center", "end")
@@ -211,7 +213,7 @@ def _placed(grids: Mapping[str, Layout], canvas: Canvas) -> dict[str, Layout]:
         low = _roomy(_filled(grids["phone_landscape"], canvas.slots), canvas)
     else:
         low = base if over else _stick_rows(base, canvas)
-    placed[SHORT] = low if over else _cropped(low)
+    placed[SHORT] = _cleared(low, base, canvas) if over else _cropped(low)
     upright = grids.get("phone_portrait") or grids.get("portrait") or wide
     phone = _cropped(_filled(upright, canvas.slots))
     if "phone_portrait" not in grids and phone.columns > PHONE_COLUMNS:
@@ -220,6 +222,26 @@ def _placed(grids: Mapping[str, Layout], canvas: Canvas) -> dict[str, Layout]:
     if (small := _compact(phone, canvas)) != phone:
         placed[SMALL] = small
     return placed
+
+
+def _cleared(grid: Layout, base: Layout, canvas: Canvas) -> Layout:
+    """Return the grid of a phone in landscape with at most one view, so that little is covered.
+
+    The view is the first one of the base grid, in the place of the first one of this grid. The
+    button for missing slots lists the others.
+    """
+
+    def views(one: Layout) -> list[Slot]:
+        found = [slot for slot in one.slots if canvas.footprints.get(slot.name) == "view"]
+        return sorted(found, key=lambda slot: (slot.row, slot.column))
+
+    slots = list(grid.slots)
+    if len(own := views(grid)) > 1:
+        names = [slot.name for slot in views(base)]
+        chosen = min(own, key=lambda slot: names.index(slot.name) if slot.name in names else 99)
+        slots = [slot for slot in slots if slot not in own]
+        slots.append(own[0]._replace(name=chosen.name))
+    return grid._replace(slots=tuple(slots))
 
 
 def _compact(grid: Layout, canvas: Canvas) -> Layout:
@@ -286,8 +308,9 @@ def _stick_rows(grid: Layout, canvas: Canvas) -> Layout:
 def _screens(place: str, grids: Mapping[str, Layout], canvas: Canvas, hand: str = "") -> str:
     """Return the rules for each screen; `hand` restricts them to left-handed layouts."""
     css = ""
+    shifted = {name for grid in grids.values() for name in _packed(grid, canvas)}
     for screen, grid in grids.items():
-        rules = hand.join(("", *_rules(place, grid, canvas, screen)))
+        rules = hand.join(("", *_rules(place, grid, canvas, screen, shifted)))
         css += rules if screen == "base" else f"@media {screen}{{{rules}}}"
     return css
 
@@ -297,17 +320,22 @@ def _filled(grid: Layout, names: Sequence[str]) -> Layout:
     return Layout(grid.rows, grid.columns, tuple(slot for slot in grid.slots if slot.name in names))
 
 
-def _rules(place: str, grid: Layout, canvas: Canvas, screen: str) -> Iterator[str]:
+def _rules(
+    place: str, grid: Layout, canvas: Canvas, screen: str, shifted: set[str]
+) -> Iterator[str]:
     yield f"{place}{{{_template(grid, canvas, screen)}}}"
     places = {slot.name: slot for slot in grid.slots}
     is_below = screen in PHONES and bool(canvas.background)
     lines = leading_values(grid, canvas) if is_below else 0
     if is_below:
         yield f'{place} [data-place="ground"]{{grid-row:1/2}}'
+    packed = {} if is_below else _packed(grid, canvas)
     for index, name in enumerate(canvas.slots):
         if name != canvas.background:
             slot = places.get(name)
             rules = _place(slot, grid, canvas, is_below)
+            if name in shifted:  # by this or another screen's grid
+                rules += packed.get(name, ";margin-inline:0")
             if slot and slot.row < lines:
                 rules += f";--urc-cell-height:{_LINE}"
             if screen == SHORT and name in canvas.drawer and not place.endswith(f'{REST}"]'):
@@ -331,6 +359,34 @@ def _template(grid: Layout, canvas: Canvas, screen: str) -> str:
     rows = " ".join(row_sizes(grid, canvas, screen)) or "none"
     columns = " ".join(tracks(grid.columns, used_columns, column, empty_column)) or "none"
     return f"grid-template-rows:{rows};grid-template-columns:{columns}"
+
+
+def _packed(grid: Layout, canvas: Canvas) -> dict[str, str]:
+    """Return the rules that pack values in the upper rows at the sides, without gaps of other rows.
+
+    Values have equal widths, so each is shifted by those before it.
+    """
+    rules: dict[str, str] = {}
+    for row in range(grid.rows if canvas.background else 0):
+        own = {slot.column: slot for slot in grid.slots if slot.row == row}
+        for side, columns in (
+            ("start", range(grid.columns)),
+            ("end", range(grid.columns - 1, -1, -1)),
+        ):
+            for place, column in enumerate(columns):
+                slot = own.get(column)
+                if slot is None or (slot.row_span, slot.column_span) != (1, 1):
+                    break
+                kind = canvas.footprints.get(slot.name)
+                is_last = kind == "button" and place > 0  # a switch is wider than a value
+                if _down(slot, grid) != "start" or not (kind == "value" or is_last):
+                    break
+                shift = f"calc({place}*(var(--urc-width-tile) + {_PACK_GAP}))"
+                margins = f"{shift} 0" if side == "start" else f"0 {shift}"
+                rules[slot.name] = f";grid-column:1/-1;--urc-across:{side};margin-inline:{margins}"
+                if is_last:
+                    break
+    return rules
 
 
 def _corners(grid: Layout, canvas: Canvas) -> dict[str, str]:
