@@ -25,8 +25,6 @@ from tests.e2e.dev_pages import served
 from tests.e2e.drawn import RED, plain, until_pixel
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
-    LEFT,
-    UP,
     USES,
     Wire,
     centre,
@@ -42,7 +40,7 @@ from urc.model.driver import Argument, Command
 from urc.model.exchange import Confirm
 from urc.model.interface import Interface, Layout, Slot, Tab, WidgetUse
 from urc.model.payload import WriteSpec
-from urc.model.values import AlarmLimits, Signal, Value
+from urc.model.values import Signal, Value
 from urc.runtime.session import CommandFailed
 from urc.testing.dashboard import FakeRobot, dashboard_profile
 from urc.testing.movers import FakeMotionBackend
@@ -202,70 +200,6 @@ async def test_another_tab_lets_go_of_what_is_held(new_page: PageMaker) -> None:
         await robot.until_stopped()
         assert await box(page, "[data-stop-button]") == place
         assert await is_on_top(page, "[data-stop-button]")
-
-
-async def test_a_button_lists_the_widgets_that_a_small_screen_lacks_and_leads_to_them(
-    new_page: PageMaker,
-) -> None:
-    """Only screens that lack widgets show it. Each change of the page releases held controls."""
-    grids = {"landscape": row("left", "right", "up"), "phone_landscape": row("left")}
-    async with driven(robot=steered(Interface("x", "X", grids))) as (robot, address):
-        page = await opened(new_page, address)
-        more = page.locator("[data-rest]")
-        await expect(more).to_be_hidden()
-        await turned(page, PHONE_LYING)
-        await expect(page.locator(UP)).to_be_hidden()
-        await expect(more).to_have_attribute("aria-pressed", "false")
-        await expect(more).to_have_text("+2")
-        await expect(more).to_have_attribute("title", "2 more widgets")
-        await expect(more).to_have_accessible_name("2 more widgets")
-        await push(page)
-        await robot.until_moving()
-        await more.focus()
-        await page.keyboard.press("Enter")
-        await page.locator("[data-rest-list]").get_by_role("button", name="Lift").focus()
-        await page.keyboard.press("Enter")
-        await robot.until_stopped()
-        await page.mouse.up()
-        await expect(more).to_have_attribute("aria-pressed", "true")
-        await expect(more).to_have_accessible_name("Back")
-        await expect(page.locator("[data-rest-list]")).to_be_hidden()
-        await expect(page.locator(LEFT)).to_be_hidden()
-        await page.locator(UP).hover()
-        await page.mouse.down()
-        await robot.until_moving("lift")
-        await more.focus()
-        await page.keyboard.press("Enter")
-        await robot.until_stopped("lift")
-        await page.mouse.up()
-        await expect(page.locator(UP)).to_be_hidden()
-        await push(page)
-        await robot.until_moving()
-        await page.mouse.up()
-        await robot.until_stopped()
-
-
-async def test_the_button_for_missing_widgets_marks_those_with_an_alarm(
-    new_page: PageMaker,
-) -> None:
-    """The shape of the alarm's priority, at the button and before the widget's name."""
-    grids = {"landscape": row("a", "b", "c"), "phone_landscape": row("a")}
-    robot = gauged(Interface("x", "X", grids))
-    signals = {**robot.profile.driver.signals, "c": Signal("c", limits=AlarmLimits(hihi=4))}
-    driver = robot.profile.driver._replace(signals=signals)
-    robot = FakeRobot(robot.profile._replace(driver=driver))
-    async with running_dashboard(robot) as address:
-        page = await new_page()
-        await page.goto(f"{address}robots/puppet/")
-        await until(lambda: robot.is_open)
-        await turned(page, PHONE_LYING)
-        more = page.locator("[data-rest]")
-        await expect(more).to_have_text("+2")
-        robot.set_reading("c", 5, alarm="hihi")
-        await expect(more).to_have_text("+2▲")
-        await expect(more).to_have_accessible_name("2 more widgets · Alarm")
-        await more.click()
-        await expect(page.locator("[data-rest-list] > button")).to_have_text(["B", "▲ C"])
 
 
 async def test_another_interface_keeps_the_connection(new_page: PageMaker) -> None:
