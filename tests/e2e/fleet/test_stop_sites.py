@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from tests.e2e.command_line import run
-from tests.e2e.fleet.servers import WAIT_S, Site, TwoSites
+from tests.e2e.fleet.two_sites import WAIT_S, Site, TwoSites
 from urc.runtime.audit_search import AuditQuery, search
 
 pytestmark = pytest.mark.anyio
@@ -56,7 +56,7 @@ async def sites(tmp_path: Path) -> AsyncIterator[TwoSites]:
     for name in NAMES:
         files.append(str(tmp_path / f"{name}.yaml"))
         Path(files[-1]).write_text(CART.replace("NAME", name), "utf-8")
-    made = await asyncio.to_thread(TwoSites, tmp_path, files, files)
+    made = await asyncio.to_thread(TwoSites, tmp_path, bern=files, zug=files)
     try:
         await asyncio.to_thread(made.start)
         async with AsyncExitStack() as stack:
