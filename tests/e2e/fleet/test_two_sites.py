@@ -45,10 +45,9 @@ async def test_a_robot_is_driven_from_another_site(sites: TwoSites) -> None:
         await reaches(robot, least=FAST)
         await driving
         await reaches(robot, most=SLOW)
-        command = ("fleet", "status", "--format", "json")
-        shown = json.loads(await asyncio.to_thread(sites.zug.command, *command))
-        found = [(one["name"], one["version"], one["present"]) for one in shown["sites"]]
-        assert found == [("bern", __version__, True)]
+        async with asyncio.timeout(WAIT_S):
+            while await asyncio.to_thread(shown, sites.zug) != [("bern", __version__, True)]:
+                pass  # the list has not arrived yet
         assert await robot.stop()
         async with sites.bern.open(ROBOT) as beside:
             await until(lambda: "(zug)" in beside.latched_by)
@@ -124,6 +123,12 @@ async def test_changed_rules_end_a_visit_and_both_sites_record_it(sites: TwoSite
     assert {one["robot"] for one in logs[0]} == {ROBOT}
     assert {one["robot"] for one in logs[1]} == {f"{ROBOT}@bern"}
     assert {one["client"] for one in logs[0]} & {one["client"] for one in logs[1]}
+
+
+def shown(site: Site) -> list[tuple[str, str, bool]]:
+    """Return name, version and presence of each other site, as `urc fleet status` shows them."""
+    found = json.loads(site.command("fleet", "status", "--format", "json"))
+    return [(one["name"], one["version"], one["present"]) for one in found["sites"]]
 
 
 def refused_by(sites: TwoSites) -> bool:

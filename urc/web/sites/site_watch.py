@@ -168,18 +168,18 @@ class SiteWatch:
 
         A site that refuses its list is asked less and less while no menu is open.
         """
-        mark, pause_s, retry_s = "", PAUSE_S, LOOK_S
+        mark, pause_s = "", PAUSE_S
         while True:
             mark = await self._ask(site, mark)
-            has_failed = bool(self._known[site].fault)
-            pause_s = PAUSE_S if mark else min(2 * pause_s, LOOK_S)
-            retry_s = min(2 * retry_s, MOST_RETRY_S) if has_failed else LOOK_S
-            await asyncio.sleep(pause_s)
+            pause_s = PAUSE_S if mark else min(2 * pause_s, MOST_RETRY_S)
+            watched_s = min(pause_s, LOOK_S)
+            await asyncio.sleep(watched_s)
             if self._clock() - self._looked_s >= WATCHED_S:
+                has_failed = bool(self._known[site].fault)
                 mark = ""
                 self._looks.clear()
                 with suppress(TimeoutError):
-                    async with asyncio.timeout(retry_s if has_failed else None):
+                    async with asyncio.timeout(pause_s - watched_s if has_failed else None):
                         await self._looks.wait()
 
     async def robot(self, far: FarName) -> Robot:
