@@ -80,6 +80,7 @@ def robot_of(*signals: Signal) -> FakeRobot:
 async def opened(new_page: PageMaker, robot: FakeRobot, address: str) -> Page:
     page = await new_page(size="desktop")
     await page.goto(f"{address}robots/puppet/")
+    await until_text(page, "[data-badge-text]", "Live")  # the bar moves no more
     await until(lambda: robot.is_open)
     await page.locator(".alerts-note", has_text="unknown values").wait_for()
     return page
