@@ -94,12 +94,15 @@ def latched(site: Site) -> set[str]:
     return {one["name"] for one in own if one["latched"] and one["confirmed"]}
 
 
-def stop_ids(site: Site, robots: set[str]) -> set[str]:
+async def stop_ids(site: Site, robots: set[str]) -> set[str]:
     """Return the identifiers of the STOPs of robots in the audit log of a site."""
-    rows = [one.entry for one in search(site.data / "audit.sqlite", AuditQuery())]
-    found = [one for one in rows if one.what == "STOP" and one.robot in robots]
-    assert {one.robot for one in found} == robots
-    return {json.loads(one.arguments)["stop"] for one in found}
+    async with asyncio.timeout(WAIT_S):
+        while True:  # the log is written in the background
+            rows = [one.entry for one in search(site.data / "audit.sqlite", AuditQuery())]
+            found = [one for one in rows if one.what == "STOP" and one.robot in robots]
+            if {one.robot for one in found} == robots:
+                return {json.loads(one.arguments)["stop"] for one in found}
+            await asyncio.sleep(0.1)
 
 
 async def test_all_robots_of_both_sites_stop(sites: TwoSites) -> None:
@@ -110,9 +113,8 @@ async def test_all_robots_of_both_sites_stop(sites: TwoSites) -> None:
     assert took_s < LONGEST_S
     for site in (sites.bern, sites.zug):
         assert latched(site) == set(NAMES)
-    await asyncio.sleep(0.5)  # the log is written in the background
-    assert stop_ids(sites.bern, set(NAMES)) == {said["id"]}
-    assert stop_ids(sites.zug, {*NAMES, *(f"{one}@bern" for one in NAMES)}) == {said["id"]}
+    assert await stop_ids(sites.bern, set(NAMES)) == {said["id"]}
+    assert await stop_ids(sites.zug, {*NAMES, *(f"{one}@bern" for one in NAMES)}) == {said["id"]}
 
 
 async def test_a_frozen_site_delays_no_other_and_is_stopped_when_it_continues(
@@ -134,7 +136,7 @@ async def test_a_frozen_site_delays_no_other_and_is_stopped_when_it_continues(
     while await asyncio.to_thread(latched, sites.bern) != set(NAMES):
         assert time.monotonic() < end_s
         await asyncio.sleep(0.1)
-    assert stop_ids(sites.bern, set(NAMES)) == {said["id"]}
+    assert await stop_ids(sites.bern, set(NAMES)) == {said["id"]}
 
 
 async def test_the_command_line_stops_all_robots_of_a_running_server(sites: TwoSites) -> None:
