@@ -57,7 +57,8 @@ test("a slow link of another site is named at the control, and so is an old imag
   const note = (percent, image) => {
     Object.assign(drive, { input: percent === null ? null : { age: 0, percent } });
     input.images.share = () => image ?? 1;
-    Object.assign(control, { sight: image === undefined ? null : { signal: "eye" } });
+    const [grip] = control.grips;
+    Object.assign(grip?.output ?? {}, { sees: image === undefined ? undefined : { signal: "eye" } });
     return input.slowNote(control);
   };
   assert.equal(note(null), "");
