@@ -245,8 +245,10 @@ class Session:
             if self.backend is not None:
                 # Before the on_close steps, which may take time.
                 self.backend.stop_all(self.frames.stop_frame)
-            await self._say_goodbye()
-            await self._end(kind, error, trace)
+            try:
+                await self._say_goodbye()
+            finally:  # a link that outlived a cancelled goodbye would connect again
+                await self._end(kind, error, trace)
         finally:
             if self.backend is not None:
                 await self.backend.finish()

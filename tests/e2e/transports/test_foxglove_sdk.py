@@ -416,6 +416,7 @@ async def test_release_a_lost_link_and_stop_end_a_motion_in_protobuf(tmp_path: P
             await until(lambda: _speeds(rover)[-1] == 0)
             first = rover
             while rover is first:  # the client may also end a motion before the link is lost
+                await asyncio.sleep(0.05)  # a refusal comes without a wait, so the link needs one
                 with suppress(MotionEnded):
                     async with robot.drive("drive") as stick:
                         await until(

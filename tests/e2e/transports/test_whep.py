@@ -16,7 +16,7 @@ from tests.e2e.ports import free_port
 from tests.e2e.transports.certificates import Authority
 from tests.e2e.transports.hostile import Talk, bounded, liar
 from tests.e2e.transports.programs import listens, program
-from tests.e2e.transports.test_camera import assert_in_order, line, readers, reason, unit
+from tests.e2e.transports.test_camera import assert_in_order, left_readers, line, reason, unit
 from urc.model.payload import Envelope
 from urc.transports.base import ConnectFailed, Transport
 
@@ -207,7 +207,7 @@ async def test_a_pause_ends_the_session_and_a_viewer_begins_a_new_one() -> None:
         await assert_streams(eye, 5)
         waiting = asyncio.create_task(eye.receive())
         await eye.send(Envelope("unsubscribe", {"topic": ""}))
-        assert readers() == []
+        assert await left_readers() == []
         assert await sessions(port) == 0
         await eye.send(Envelope("subscribe", {"topic": ""}))
         async with asyncio.timeout(30.0):

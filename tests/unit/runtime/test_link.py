@@ -8,6 +8,7 @@ import pytest
 
 from urc.model.driver import Backoff, Timeouts
 from urc.model.profile import Profile
+from urc.model.sequence import WaitStep
 from urc.runtime.link import SLICE_BYTES
 from urc.runtime.output_buffer import MAX_QUEUED_BYTES
 from urc.runtime.session import CommandFailed, Session
@@ -440,3 +441,28 @@ async def test_a_good_line_is_left_alone_by_a_request_to_try_it() -> None:
         session.reconnect()
         await clock.advance(1)
         assert (line.opens, state_of(session)) == (1, ("live", ""))
+
+
+async def test_a_session_cancelled_during_its_goodbye_leaves_no_connection() -> None:
+    """A link that stays would connect to the robot again, with nobody to close it."""
+    profile = line_profile()
+    wire = profile.driver.transports["wire"]
+    slow = wire._replace(on_close=(WaitStep(1.0),))
+    profile = profile._replace(driver=profile.driver._replace(transports={"wire": slow}))
+    clock, line = FakeClock(), MemoryTransport(answer=says_42)
+    before = asyncio.all_tasks()
+    is_leaving = asyncio.Event()
+
+    async def use() -> None:
+        async with opened(line, clock, profile):
+            is_leaving.set()
+
+    using = asyncio.create_task(use())
+    await is_leaving.wait()
+    await settle()
+    assert line.is_open
+    using.cancel()
+    await clock.advance(0)
+    assert using.cancelled()
+    assert not line.is_open
+    assert asyncio.all_tasks() == before
