@@ -50,6 +50,7 @@ NAMES = (
     "fleet_cuts",
     "fleet_ticks",
     "fleet_size",
+    "fleet_soak",
     "fleet_stop",
     "motion_counters",
     "motion_flood",

@@ -7,6 +7,7 @@ nanoseconds::
 
     pid NUMBER PID          the process of plan NUMBER
     port NUMBER PORT        its source port, for cuts by a relay
+    reset NUMBER TIME       it resets STOP now
     driving NUMBER TIME     the first tick was sent
     dying NUMBER TIME TEXT  it vanishes now; TEXT is the server's last refusal, if any
     failed NUMBER TEXT      it could not drive
@@ -63,6 +64,12 @@ class Plan(NamedTuple):
     """Cookie from a sign-in, ``name=secret``; "" for no cookie."""
     has_spare: bool = False
     """Whether the page also sends held controls on a second connection."""
+    verb: str = "take"
+    """How the page asks for the controls: ``take``, or ``force`` to take them from another."""
+    resets: bool = True
+    """Whether the page resets STOP before it drives; otherwise it waits."""
+    mark: int | None = None
+    """Last digit of each value, in base 16; it tells apart pages that drive the same robot."""
 
 
 class Page:
@@ -78,6 +85,8 @@ class Page:
         self.you = ""
         self.is_mine = False
         self.is_latched = False
+        self.stops = 0
+        """Number of STOPs until now, which a reset has to name."""
         self.is_live = False
         """Whether the robot is connected.
 
@@ -188,6 +197,7 @@ class Page:
             self.key = message["spare"]
             self.is_mine = bool(self.you) and self.holder == self.you
             self.is_latched = bool(message.get("latched"))
+            self.stops = message["stops"]
         elif kind == "links":
             self.is_live = all(one["state"] == "live" for one in message["links"])
         elif kind == "beat":
@@ -199,6 +209,8 @@ class Page:
         """Send the time in microseconds as a sample of the held control; return this time."""
         self.sent += 1
         value = time.monotonic_ns() // 1000
+        if self.plan.mark is not None:
+            value += self.plan.mark - value % 16
         self._say_twice(
             {
                 "t": "tick",
@@ -242,10 +254,16 @@ class Page:
                 raise TimeoutError(f"no controls ({state}): {self.refusal or 'no answer'}")
             # The previous operator is leaving, so repeat the request until the controls are free.
             if self.you and not self.is_mine and now_ns - asked_ns > TICK_NS:
-                verb = "reset" if self.is_latched else "take"
-                self.say({"t": "drive", "verb": verb})
+                self._ask()
                 asked_ns = now_ns
             self.wait(now_ns + TICK_NS // 5)
+
+    def _ask(self) -> None:
+        if not self.is_latched:
+            self.say({"t": "drive", "verb": self.plan.verb})
+        elif self.plan.resets:
+            tell("reset", self.plan.number, time.monotonic_ns())
+            self.say({"t": "drive", "verb": "reset", "stops": self.stops})
 
 
 def _frame_of(data: bytes) -> tuple[int, bytes, bytes] | None:
@@ -295,8 +313,8 @@ def _no_release_meanwhile() -> Iterator[None]:
 
 
 def _drive(page: Page, next_ns: int, until_ns: int, every_ns: int = TICK_NS) -> None:
-    """Send ticks at a fixed rate until the time `until_ns`."""
-    while next_ns < until_ns:
+    """Send ticks at a fixed rate until the time `until_ns`, or until the server is gone."""
+    while next_ns < until_ns and not page.is_closed:
         page.wait(next_ns)
         with _no_release_meanwhile():
             if not page.has_let_go:
