@@ -15,7 +15,7 @@ from pathlib import Path
 from scripts.chromium.bring import BringError, bring_chromium
 from scripts.node import node_executable, playwright_environment
 
-__all__ = ["AXE", "NEEDS", "Brought", "Need", "bring"]
+__all__ = ["AXE", "NEEDS", "Brought", "Need", "bring", "faketime_library"]
 
 APT_TIMEOUT_S = 600
 ROSLIB = Path(__file__).resolve().parents[1] / "node_modules" / "roslib"
@@ -46,6 +46,12 @@ def _rtsp_server() -> Iterator[str]:
             and Path("/usr/lib/python3/dist-packages/gi").is_dir()
         ):
             yield os.fspath(found[-1])
+
+
+def faketime_library() -> str | None:
+    """Return the library that gives a program with threads another time of day, or None."""
+    found = Path("/usr/lib").glob("*-linux-*/faketime/libfaketimeMT.so.1")
+    return next(map(os.fspath, found), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +168,13 @@ NEEDS = (
         package="iproute2",
         purpose="tests of a robot with fixed ports, as root only",
         other=lambda: shutil.which("ip", path=_SYSTEM_PATH) if _is_root() else None,
+    ),
+    Need(
+        name="faketime",
+        executables=(),
+        package="faketime",
+        purpose="tests of servers with a wrong clock",
+        other=faketime_library,
     ),
     Need(
         name="ser2net",

@@ -172,9 +172,11 @@ def _authority(data: Path) -> str:
 
 
 def _fleet(data: Path) -> Iterator[_Finding]:
+    from urc.cli.fleet_sites import site_faults
     from urc.fleet.faults import membership_faults
     from urc.fleet.files import FLEET_FOLDER
     from urc.fleet.membership import Membership, NoMembership
+    from urc.fleet.reach import reach_faults
     from urc.fleet.rules import OPEN
     from urc.fleet.rules_file import RULES_FILE, read_rules
 
@@ -193,6 +195,8 @@ def _fleet(data: Path) -> Iterator[_Finding]:
         if rules is OPEN:
             text = "visitors may drive if their site proposes it; see 'urc fleet rules'"
         yield _Finding("fleet rules", True, text)
+        faults = [*reach_faults(own, datetime.now(UTC)), *site_faults(data)]
+        yield from (_Finding("fleet", False, one) for one in faults)
 
 
 def _load_robots() -> str:

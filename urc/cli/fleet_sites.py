@@ -4,15 +4,18 @@ import argparse
 import json
 from http.client import HTTPException
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
 from urc.cli.identities import show
 from urc.runtime.running_servers import RunningServer, headers, open_connection, servers
 
-__all__ = ["known_sites", "show_sites"]
+__all__ = ["known_sites", "show_sites", "site_faults"]
 
 _ANSWER_S: Final = 3.0
 """Time limit for each step of the request, in seconds."""
+_NEWS_S: Final = 1.0
+"""Wait for new lists of the sites, in seconds."""
 _MOST_BYTES: Final = 1 << 24
 
 
@@ -26,6 +29,17 @@ def known_sites(data: Path) -> list[dict[str, Any]]:
         if found:
             return found
     return []
+
+
+def site_faults(data: Path) -> list[str]:
+    """Return why the robots of present sites cannot be used here, one line for each site.
+
+    A running server asks the sites for their lists because of the first look.
+    """
+    if not known_sites(data):
+        return []
+    Event().wait(_NEWS_S)
+    return [one["fault"] for one in known_sites(data) if one.get("fault")]
 
 
 def show_sites(sites: list[dict[str, Any]], arguments: argparse.Namespace) -> None:

@@ -9,12 +9,17 @@ import re
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Any, Final, get_args
 
+from urc.fleet.certificates import duration
 from urc.model.role import Role
 from urc.problems import UrcError
 
-__all__ = ["LASTS_S", "SCHEME", "Assertion", "BadAssertion", "sign_assertion", "verified_assertion"]
+__all__ = [
+    "LASTS_S", "SCHEME", "Assertion", "BadAssertion", "clock_refusal",
+    "sign_assertion", "verified_assertion",
+]  # fmt: skip
 
 LASTS_S: Final = 30.0
 """Time for which an assertion is valid, in seconds. Open sockets renew it."""
@@ -121,13 +126,39 @@ def verified_assertion(
     begins, ends = claims.get("iat"), claims.get("exp")
     if not isinstance(begins, int) or not isinstance(ends, int):
         raise BadAssertion("the assertion has no times")
-    if now > ends + _CLOCKS_S or ends - begins > LASTS_S + 2:
-        raise BadAssertion(f"the assertion ended {now - ends:.0f} s ago; compare the sites' clocks")
-    if now < begins - _CLOCKS_S:
+    if ends - begins > LASTS_S + 2:
         raise BadAssertion(
-            f"the assertion begins in {begins - now:.0f} s; compare the sites' clocks"
+            f"the assertion lasts {ends - begins} s; at most {LASTS_S:g} s are valid"
         )
+    if now > ends + _CLOCKS_S:
+        raise BadAssertion(
+            f"the assertion of the site {issuer} ended {_time(now - ends)} ago; compare the clocks"
+            f" of the sites {issuer} and {audience}"
+        )
+    if refused := clock_refusal(issuer, audience, max(0.0, begins - now)):
+        raise BadAssertion(refused)
     return _parsed(claims)
+
+
+def clock_refusal(site: str, other: str, ahead_s: float) -> str:
+    """Return why two sites do not accept each other's assertions, as one line; "" if they do.
+
+    Args:
+        site: a site.
+        other: another site.
+        ahead_s: time by which the clock of `site` is ahead, in seconds; negative if it is behind.
+    """
+    if abs(ahead_s) <= _CLOCKS_S:
+        return ""
+    fast, slow = (site, other) if ahead_s > 0 else (other, site)
+    return (
+        f"the clock of the site {fast} is {_time(abs(ahead_s))} ahead of the clock of the site"
+        f" {slow}; set the wrong clock"
+    )
+
+
+def _time(seconds: float) -> str:
+    return duration(timedelta(seconds=seconds))
 
 
 def _parsed(claims: Mapping[str, object]) -> Assertion:

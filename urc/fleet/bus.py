@@ -68,5 +68,11 @@ class FleetBus(Protocol):
             body: at most `MAX_MESSAGE_BYTES`.
         """
 
+    async def refresh(self) -> None:
+        """Use this site's current certificate for new connections; raise `BusFailed` on a fault.
+
+        The other sites may be absent for a moment, and lines to them may end.
+        """
+
     async def close(self) -> None:
         """Leave the network; the other sites learn this soon. The method never raises."""

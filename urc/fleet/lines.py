@@ -60,6 +60,11 @@ class Lines:
         """Names of the other sites that are present."""
         return self._bus.sites
 
+    @property
+    def count(self) -> int:
+        """Number of open lines."""
+        return len(self._lines)
+
     def dial(self, site: str, lane: Lane, protocol: asyncio.Protocol) -> "LineTransport":
         """Open a line, and call the protocol's `connection_made`.
 

@@ -140,11 +140,22 @@ class ZenohBus(FleetBus):
             return False
         return True
 
+    async def refresh(self) -> None:
+        """Open both sessions again if this site listens: Zenoh reads a listener's files only once.
+
+        For each connection to another site, Zenoh reads the files again.
+        """
+        if self._options.listen:
+            await self.close()
+            self.on_sites()
+            await self.open()
+
     async def close(self) -> None:
         """Undeclare the token, and close both sessions."""
         if self._joining is not None:
             self._joining.cancel()
             await asyncio.wait((self._joining,))
+            self._joining = None
         sessions, self._sessions = self._sessions, {}
         self._declared.clear()
         self._publishers.clear()

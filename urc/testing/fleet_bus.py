@@ -99,6 +99,12 @@ class FakeFleetBus(FleetBus):
             raise ValueError(f"a message has {len(body)} bytes; at most {MAX_MESSAGE_BYTES}")
         return self._network.carry(self._site, site, lane, body)
 
+    async def refresh(self) -> None:
+        """Leave the network, and join it again."""
+        await self.close()
+        self.on_sites()
+        await self.open()
+
     async def close(self) -> None:
         """Leave the network."""
         self._network.left(self)

@@ -136,6 +136,19 @@ async def test_a_site_that_returns_is_present_again(network: Network) -> None:
     await until(lambda: [one.body for one in network.arrived["genf"]] == [b"welcome"])
 
 
+async def test_sites_see_each_other_again_after_a_refresh(network: Network) -> None:
+    """It is a short absence; afterwards messages pass in both directions."""
+    await network.open("bern", "genf")
+    await network.see_each_other("bern", "genf")
+    for site in ("bern", "genf"):
+        await network.buses[site].refresh()
+        await network.see_each_other("bern", "genf")
+    assert network.buses["bern"].send("genf", "control", b"one")
+    assert network.buses["genf"].send("bern", "data", b"two")
+    await until(lambda: [one.body for one in network.arrived["genf"]] == [b"one"])
+    await until(lambda: [one.body for one in network.arrived["bern"]] == [b"two"])
+
+
 async def test_a_site_works_before_the_others_are_there(network: Network) -> None:
     """An unreachable network is no failure; the site joins as soon as it can."""
     await network.open("genf")

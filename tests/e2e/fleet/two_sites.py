@@ -1,12 +1,15 @@
 """Two servers in processes of their own, for tests: a site with robots, a site with a screen."""
 
 import asyncio
+import json
 import os
+import re
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import urllib3
@@ -19,7 +22,7 @@ from tests.e2e.processes import UrcProcess
 from urc.client.remote import RemoteRobot
 from urc.problems import UrcError
 
-__all__ = ["FAST", "ROBOT", "SLOW", "WAIT_S", "Site", "TwoSites", "reaches"]
+__all__ = ["FAST", "ROBOT", "SLOW", "WAIT_S", "Site", "TwoSites", "reaches", "until_said"]
 
 ROBOT = "turtlebot4"
 WAIT_S = 40.0
@@ -36,17 +39,22 @@ class Site:
         self.port = free_port()
         self.process: UrcProcess | None = None
         self.key = ""
+        self.environment: dict[str, str] = {}
+        """Further environment variables of the server and of all commands."""
+        self.is_emulated = True
+        """Whether the server emulates its robots."""
 
     def command(self, *words: str) -> str:
         """Return the output of a command with this site's data folder."""
-        done = run(*words, "--data-dir", str(self.data))
+        done = run(*words, "--data-dir", str(self.data), **self.environment)
         assert done.returncode == 0, done.stderr
         return done.stdout.strip()
 
     def start(self) -> None:
         """Start the server, and wait for its address."""
-        words = ("serve", *self.robots, "--simulate", "--fleet", "--port", str(self.port))
-        self.process = UrcProcess((*words, "--data-dir", str(self.data)), {})
+        words = ["serve", *self.robots, "--fleet", "--port", str(self.port)]
+        words += ["--data-dir", str(self.data), *(["--simulate"] if self.is_emulated else [])]
+        self.process = UrcProcess(words, self.environment)
         address = self.process.wait_for(r"dashboard (http\S+)")[1]
         self.key = with_key(address).partition("key=")[2]
 
@@ -54,6 +62,17 @@ class Site:
         """Kill the server, as a lost computer would end."""
         assert self.process is not None
         self.process.kill()
+
+    def is_renewed(self) -> bool:
+        """Return whether the site has replaced the certificate of its invitation."""
+        return not json.loads(self.command("fleet", "status", "--format", "json"))["is_invitation"]
+
+    def doctor(self) -> list[str]:
+        """Return what `urc doctor` says about the fleet, without the rules and packages."""
+        done = run("doctor", "--data-dir", str(self.data), **self.environment)
+        assert done.returncode in (0, 1), done.stderr
+        found = re.findall(r"^(ok|MISSING) +fleet {2,}(.*)$", done.stdout, re.MULTILINE)
+        return [f"{mark} {text}" for mark, text in found]
 
     def open(self, robot: str) -> AbstractAsyncContextManager[RemoteRobot]:
         """Return a program's connection to a robot, through this server."""
@@ -86,6 +105,7 @@ class TwoSites:
         *,
         bern: Sequence[str] = (ROBOT,),
         zug: Sequence[str] = ("puppet",),
+        environment: Mapping[str, str] = MappingProxyType({}),
     ) -> None:
         """Make both sites.
 
@@ -94,14 +114,19 @@ class TwoSites:
             way: first port of a relay, by which zug reaches bern; None for the direct way.
             bern: robots of bern.
             zug: robots of zug.
+            environment: further environment variables of both sites.
         """
         self.bern = Site(folder / "bern", *bern)
         self.zug = Site(folder / "zug", *zug)
+        for site in (self.bern, self.zug):
+            site.environment = dict(environment)
         self.port = free_pair()
-        listen, address = f"127.0.0.1:{self.port}", f"127.0.0.1:{way or self.port}"
+        self.address = f"127.0.0.1:{way or self.port}"
+        """Address by which zug reaches bern."""
+        listen = f"127.0.0.1:{self.port}"
         self.bern.command("fleet", "init", "lab", "--site", "bern", "--listen", listen)
         self.zug.data.mkdir(parents=True)
-        code = self.bern.command("fleet", "invite", "zug", "--address", address)
+        code = self.bern.command("fleet", "invite", "zug", "--address", self.address)
         self.zug.command("fleet", "join", code)
 
     def start(self) -> None:
@@ -114,6 +139,14 @@ class TwoSites:
         for site in (self.bern, self.zug):
             if site.process is not None:
                 site.kill()
+
+    def start_renewed(self) -> None:
+        """Start both servers, and wait until zug has a certificate of its own."""
+        self.start()
+        end_s = time.monotonic() + WAIT_S
+        while not self.zug.is_renewed():
+            assert time.monotonic() < end_s
+            time.sleep(0.1)
 
     async def far(self, robot: str = ROBOT) -> RemoteRobot:
         """Return a robot of bern as seen from zug, as soon as zug can reach it."""
@@ -141,3 +174,14 @@ async def reaches(robot: RemoteRobot, *, least: float = -9.0, most: float = 9.0)
             if isinstance(sample.value, (int, float)) and least <= abs(sample.value) <= most:
                 break
     return time.monotonic()
+
+
+def until_said(site: Site, path: str, body: object, status: int) -> dict[str, Any]:
+    """Repeat a request until its response has a status, and return the response."""
+    end_s = time.monotonic() + WAIT_S
+    while True:
+        found, said = site.ask(path, body)
+        if found == status:
+            return said
+        assert time.monotonic() < end_s, said
+        time.sleep(0.1)

@@ -20,6 +20,7 @@ from urc.fleet.files import AUTHORITY_FOLDER
 from urc.fleet.joining import renew_own
 from urc.fleet.membership import Membership
 from urc.fleet.names import FleetError
+from urc.fleet.reach import reach_faults
 from urc.web.serve.site_peer import CERTIFICATE, SitePeer, site_of
 from urc.web.sites.site_client import SiteClient, SiteFailed
 
@@ -30,6 +31,8 @@ _LOOK_S: Final = 0.1
 """Interval between checks of the authority's revocation list, in seconds."""
 _RENEW_S: Final = 10.0
 """Interval between attempts to renew the certificate, in seconds."""
+_ALONE_S: Final = 5.0
+"""Interval between checks whether this site has reached its fleet, in seconds."""
 
 log = logging.getLogger(__name__)
 
@@ -65,6 +68,11 @@ class Member:
     def folder(self) -> Path:
         """Folder of the membership."""
         return self._membership.folder
+
+    @property
+    def certificate(self) -> SiteCertificate:
+        """The current certificate of this site."""
+        return self._membership.certificate
 
     @property
     def number(self) -> int:
@@ -141,6 +149,7 @@ class Member:
         """Renew the certificate when it is due, and spread revocations, until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._keep_certificate(client))
+            group.create_task(self._explain(client))
             if self._authority is not None:
                 group.create_task(self._spread(client, self._authority))
 
@@ -182,6 +191,20 @@ class Member:
                         *(self._send(client, site, signed) for site in client.sites)
                     )
             await asyncio.sleep(_LOOK_S)
+
+    async def _explain(self, client: SiteClient) -> None:
+        """Log why this site reaches no other site, and log each new reason."""
+        told: list[str] = []
+        while True:
+            await asyncio.sleep(_ALONE_S)
+            if client.sites:
+                told = []
+                continue
+            found = await asyncio.to_thread(list, reach_faults(self._membership, self._utc()))
+            if found != told and not client.sites:
+                for fault in found:
+                    log.warning("the fleet cannot be reached at %s", fault)
+                told = found
 
     async def _keep_certificate(self, client: SiteClient) -> None:
         while True:

@@ -4,6 +4,7 @@ Layer 5. The module combines the other modules of the package.
 """
 
 import asyncio
+import logging
 import ssl
 import time
 from collections.abc import AsyncIterator, Callable
@@ -18,7 +19,7 @@ from urc import __version__
 from urc.access.directory import Kind
 from urc.access.visits import Visit
 from urc.fleet.assertion import Assertion, sign_assertion, verified_assertion
-from urc.fleet.bus import FleetBus
+from urc.fleet.bus import BusFailed, FleetBus
 from urc.fleet.lines import Lines
 from urc.fleet.rules import Applicant
 from urc.fleet.rules_file import RULES_FILE, RulesFile
@@ -43,6 +44,13 @@ __all__ = ["SiteKeys", "SiteNetwork"]
 
 RULES_S: Final = 0.2
 """Interval between two looks at the file of rules, in seconds."""
+REFRESH_S: Final = 1.0
+"""Interval between checks whether the network uses the current certificate, in seconds."""
+LAST_S: Final = 12 * 3600.0
+"""Time before the end of a replaced certificate from which open lines delay no refresh, in
+seconds."""
+
+log = logging.getLogger(__name__)
 
 
 class SiteKeys(Protocol):
@@ -101,7 +109,7 @@ class SiteNetwork:
         self.door = SiteDoor(keys.server_context, keys.peer)
         self._lines = Lines(bus, self.door.accept)
         self.client = SiteClient(self._lines, keys.client_context, keys.peer)
-        self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version))
+        self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version), utc=utc)
         self.stops = SiteStops(self.client)
         self.proofs = VisitorProofs(self, self._visits)
         """Headers that tell other sites who acts."""
@@ -200,6 +208,26 @@ class SiteNetwork:
             for visit in self._access.control.judge_visits(self._judged):
                 self._visits.received(visit)
 
+    async def _follow_certificate(self, member: Member) -> None:
+        """Let the network use each renewed certificate.
+
+        A refresh ends lines, so it waits for a moment without lines. Before the old certificate
+        ends, it no longer waits: other sites could not connect afterwards.
+        """
+        used = member.certificate
+        while True:
+            await asyncio.sleep(REFRESH_S)
+            current = member.certificate
+            is_last = self._utc() > used.ends.timestamp() - LAST_S
+            if current.serial == used.serial or (self._lines.count and not is_last):
+                continue
+            try:
+                await self._bus.refresh()
+            except BusFailed as fault:
+                log.warning("%s", fault)
+            else:
+                used = current
+
     def _sites_changed(self, sites: frozenset[str]) -> None:
         self.watch.changed()
         new, self._present = sites - self._present, sites
@@ -225,6 +253,7 @@ class SiteNetwork:
         tasks = [asyncio.create_task(self.watch.run()), asyncio.create_task(self._follow_rules())]
         if self.member is not None:
             tasks.append(asyncio.create_task(self.member.keep(self.client)))
+            tasks.append(asyncio.create_task(self._follow_certificate(self.member)))
         try:
             yield
         finally:

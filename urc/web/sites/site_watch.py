@@ -18,6 +18,7 @@ from urllib.parse import quote
 
 import msgspec
 
+from urc.fleet.assertion import clock_refusal
 from urc.fleet.versions import UNKNOWN, parse_version, version_refusal
 from urc.model.profile import Profile
 from urc.model.values import Value
@@ -65,6 +66,8 @@ class KnownSite:
     """Version of URC at the site."""
     fault: str = ""
     """Why the site's list cannot be read now; "" if it can."""
+    ahead_s: float = 0.0
+    """Time by which the site's clock was ahead of this site's clock, in seconds."""
 
 
 class SiteWatch:
@@ -77,6 +80,7 @@ class SiteWatch:
         clock: Callable[[], float] = time.monotonic,
         *,
         own: tuple[str, str] = ("", UNKNOWN),
+        utc: Callable[[], float] = time.time,
     ) -> None:
         """Know no site yet.
 
@@ -85,7 +89,9 @@ class SiteWatch:
             folder: folder of the membership.
             clock: time in seconds.
             own: name of this site, and its version of URC.
+            utc: UTC time in seconds since 1970.
         """
+        self._utc = utc
         self._client = client
         self._folder = folder / FOLDER
         self._clock = clock
@@ -111,12 +117,24 @@ class SiteWatch:
         known = self._known.get(site)
         return version_refusal(site, known.version, *self._own) if known is not None else ""
 
+    def trouble(self, site: str) -> str:
+        """Return why the robots of a present site cannot be used; "" if they can.
+
+        Unlike `refusal`, the reason may be over before the next list arrives, so it stops nothing.
+        """
+        known = self._known.get(site)
+        if known is None:
+            return ""
+        return self.refusal(site) or known.fault or clock_refusal(site, self._own[0], known.ahead_s)
+
     def states(self) -> list[SiteState]:
         """Return all known sites, for the menu and for `urc fleet status`."""
-        return [
-            SiteState(name, _shown(one.version), self.is_present(name), self.refusal(name))
-            for name, one in sorted(self._known.items())
-        ]
+        found = []
+        for name, one in sorted(self._known.items()):
+            is_here = self.is_present(name)
+            trouble = self.trouble(name) if is_here else self.refusal(name)
+            found.append(SiteState(name, _shown(one.version), is_here, trouble))
+        return found
 
     def presence(self) -> dict[str, bool]:
         """Return whether each known site can be reached now."""
@@ -129,13 +147,13 @@ class SiteWatch:
     def summaries(self) -> list[RobotSummary]:
         """Return all robots of other sites, with their names on this server, and note the look.
 
-        Robots of an absent site, or of one with a version too far apart, are lost, with the reason.
+        Robots of a site that is absent or in trouble are lost, with the reason.
         """
         self._looked_s = self._clock()
         self._looks.set()
         found = []
         for site, known in sorted(self._known.items()):
-            reason = self.refusal(site)
+            reason = self.trouble(site)
             if not self.is_present(site):
                 reason = f"the site {site} cannot be reached"
             for robot, one in known.robots.items():
@@ -228,7 +246,8 @@ class SiteWatch:
             self._known[site] = KnownSite(site, robots, self._clock(), version, str(error))
             return ""
         robots = {one.summary.name: one for one in found.robots[:MAX_ROBOTS]}
-        self._known[site] = KnownSite(site, robots, self._clock(), found.version)
+        ahead_s = found.time - self._utc()
+        self._known[site] = KnownSite(site, robots, self._clock(), found.version, ahead_s=ahead_s)
         return found.mark
 
     async def _profile(self, far: FarName, digest: str) -> Profile:
