@@ -2,6 +2,7 @@
 
 import socketserver
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Final
 __all__ = ["NAME", "CountedRobot"]
 
 NAME: Final = "cart"
+_WAIT_S: Final = 10.0
 _DOCUMENT: Final = """\
 urc: 1
 kind: robot
@@ -76,6 +78,9 @@ class CountedRobot:
         file.write_text(_DOCUMENT.replace("PORT", str(self.port)), encoding="utf-8")
         return str(file)
 
-    def count(self, word: str) -> int:
-        """Return how many lines began with a word."""
-        return sum(line.startswith(word) for line in tuple(self.heard))
+    def hears(self, *lines: str) -> None:
+        """Wait until the robot has heard as many lines, and check that it has heard these."""
+        end_s = time.monotonic() + _WAIT_S
+        while len(self.heard) < len(lines) and time.monotonic() < end_s:
+            time.sleep(0.01)
+        assert self.heard == [*lines]

@@ -61,7 +61,7 @@ def test_an_ended_certificate_is_refused_until_a_new_invitation(
         zug.command("fleet", "join", code)
         zug.start()
         until_said(zug, HORN, {}, 200)
-        assert robot.count("horn") == 1
+        robot.hears("horn")
     finally:
         sites.kill()
 
@@ -127,12 +127,13 @@ def test_a_revoked_certificate_is_told_in_lists_and_by_doctor(
     try:
         sites.start_renewed()
         until_said(zug, HORN, {}, 200)
+        robot.hears("horn")
         zug.ask("/api/v1/robots")
         sites.bern.command("fleet", "revoke", "zug")
         fault = "the site bern refuses the connection: the certificate of site zug is revoked"
         assert until_said(zug, HORN, {}, 502)["message"] == fault
         assert zug.ask(f"{ROBOT}/stop", {})[1]["message"] == fault
-        assert robot.count("horn") == 1
+        assert robot.heard == ["horn"]
         assert zug.doctor()[-1] == f"MISSING {fault}"
         assert sites.bern.doctor()[-1] == (
             "MISSING no secure connection to the site zug: the certificate of site zug is revoked"

@@ -5,21 +5,20 @@ browser's connection: requests, sockets, flow control and limits.
 """
 
 import asyncio
-import logging
 import ssl
 from collections.abc import Callable, Mapping
 from typing import Any, Final, cast
 
 from urc.fleet.lines import LineTransport
-from urc.problems import UrcError
+from urc.problems import UrcError, printable
 from urc.web.serve.site_peer import SitePeer
 from urc.web.serve.tls_connection import TlsConnection
+from urc.web.sites.refusal_log import RefusalLog
 
 __all__ = ["HANDSHAKE_S", "SiteDoor"]
 
 HANDSHAKE_S: Final = 5.0
 """Time limit for the TLS handshake, in seconds."""
-log = logging.getLogger(__name__)
 
 _Make = Callable[[Mapping[str, Any]], asyncio.Protocol]
 
@@ -28,7 +27,10 @@ class SiteDoor:
     """Accepts the lines of other sites for one server."""
 
     def __init__(
-        self, context: Callable[[], ssl.SSLContext], peer: Callable[[bytes], SitePeer]
+        self,
+        context: Callable[[], ssl.SSLContext],
+        peer: Callable[[bytes], SitePeer],
+        refusals: RefusalLog,
     ) -> None:
         """Create the door, which refuses all lines until `open`.
 
@@ -36,7 +38,9 @@ class SiteDoor:
             context: function that returns mutual TLS with the fleet's root certificate.
             peer: function that returns the site of a certificate in DER that TLS has proven. It
                 raises `UrcError` for a revoked certificate.
+            refusals: log of the refused lines.
         """
+        self._refusals = refusals
         self._context = context
         self._peer = peer
         self._make: _Make | None = None
@@ -68,7 +72,11 @@ class SiteDoor:
         def step() -> None:
             holder[0].continue_handshake()
 
-        connection = TlsConnection(line, self._context(), made, step, lambda: None)
+        def ended() -> None:
+            if fault := holder[0].fault:
+                self._refusals.tell("a line", line.site, fault)
+
+        connection = TlsConnection(line, self._context(), made, step, ended)
         holder.append(connection)
         return connection
 
@@ -77,13 +85,19 @@ class SiteDoor:
         try:
             peer = self._peer(der or b"")
         except UrcError as fault:
-            log.warning("a line of the site %s is refused: %s", line.site, fault)
-            line.refuse(str(fault))
-            return _Refusing()
-        if self._make is None or peer.name != line.site:
-            line.refuse(f"the certificate is not for the site {line.site}")
-            return _Refusing()
+            return self._refused(line, str(fault))
+        if peer.name != line.site:
+            return self._refused(
+                line, f"the certificate is for the site {peer.name}, not {printable(line.site)}"
+            )
+        if self._make is None:
+            return self._refused(line, "the server is not ready; try again")
         return self._make({"site": peer})
+
+    def _refused(self, line: LineTransport, reason: str) -> asyncio.Protocol:
+        self._refusals.tell("a line", line.site, reason)
+        line.refuse(reason)
+        return _Refusing()
 
 
 class _Entering(asyncio.Protocol):

@@ -18,7 +18,7 @@ from starlette.types import ASGIApp
 from urc import __version__
 from urc.access.directory import Kind
 from urc.access.visits import Visit
-from urc.fleet.assertion import Assertion, sign_assertion, verified_assertion
+from urc.fleet.assertion import Assertion, BadAssertion, sign_assertion, verified_assertion
 from urc.fleet.bus import BusFailed, FleetBus
 from urc.fleet.lines import Lines
 from urc.fleet.rules import Applicant
@@ -33,6 +33,7 @@ from urc.web.sites.door import SiteDoor
 from urc.web.sites.gateway import Gateway
 from urc.web.sites.member import Member
 from urc.web.sites.member_routes import MemberRoutes
+from urc.web.sites.refusal_log import RefusalLog
 from urc.web.sites.site_client import SiteClient
 from urc.web.sites.site_stops import SiteStops
 from urc.web.sites.site_watch import SiteWatch
@@ -106,7 +107,8 @@ class SiteNetwork:
         self._utc = utc
         self.version = version
         self.member = member
-        self.door = SiteDoor(keys.server_context, keys.peer)
+        self._refusals = RefusalLog()
+        self.door = SiteDoor(keys.server_context, keys.peer, self._refusals)
         self._lines = Lines(bus, self.door.accept)
         self.client = SiteClient(self._lines, keys.client_context, keys.peer)
         self.watch = SiteWatch(self.client, keys.folder, own=(keys.site, version), utc=utc)
@@ -142,9 +144,13 @@ class SiteNetwork:
             BadAssertion: the assertion does not count.
             UrcError: the versions of the two sites are too far apart.
         """
-        said = verified_assertion(
-            text, issuer=peer.name, audience=self.site, key_pem=peer.key_pem, now=self._utc()
-        )
+        try:
+            said = verified_assertion(
+                text, issuer=peer.name, audience=self.site, key_pem=peer.key_pem, now=self._utc()
+            )
+        except BadAssertion as fault:
+            self._refusals.tell("a visitor", peer.name, str(fault))
+            raise
         if text := version_refusal(peer.name, said.version, self.site, self.version):
             raise UrcError(text)
         kind = cast("Kind", said.kind)
