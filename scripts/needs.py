@@ -163,6 +163,13 @@ NEEDS = (
         is_of_root=True,
     ),
     Need(
+        name="tmpfs",
+        executables=(),
+        package="mount",
+        purpose="tests of a full disk, as root only",
+        other=lambda: shutil.which("mount", path=_SYSTEM_PATH) if _is_root() else None,
+    ),
+    Need(
         name="netns",
         executables=(),
         package="iproute2",

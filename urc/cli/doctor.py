@@ -2,6 +2,7 @@
 
 import argparse
 import platform
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -59,6 +60,9 @@ FOLDERS: tuple[Literal["schemas", "robots", "widgets", "templates"], ...] = (
     "widgets",
     "templates",
 )
+_MEGABYTE = 1_000_000
+LEAST_FREE = 20 * _MEGABYTE
+"""Free space in bytes below which the disk of the data folder counts as full."""
 _VENDOR_REMEDY = "install the wheel, or run ./dev once; plots are not available without these files"
 
 
@@ -117,6 +121,7 @@ def _problems(port: int, data: Path) -> Iterator[_Finding]:
     yield _Finding("urc_vendor", is_vendored, text, is_required=False)
     yield _priority()
     yield _clock(data)
+    yield _disk(data)
     yield _attempt("authority", lambda: _authority(data), is_required=False)
     yield from _fleet(data)
     yield _attempt("port", lambda: _try_port(port), is_required=False)
@@ -169,6 +174,18 @@ def _authority(data: Path) -> str:
         reason = getattr(error, "strerror", None) or "expected a certificate in PEM"
         raise UrcError(f"{file} cannot be used: {reason}") from error
     return f"{fingerprint(root)}, until {root.not_valid_after_utc:%Y-%m-%d}"
+
+
+def _disk(data: Path) -> _Finding:
+    place = next((one for one in (data, *data.parents) if one.exists()), data)
+    try:
+        free = shutil.disk_usage(place).free
+    except OSError as error:
+        return _Finding("disk", False, f"{place}: {error.strerror}", is_required=False)
+    text = f"{free // _MEGABYTE} MB are free for {data}"
+    if free < LEAST_FREE:
+        text += "; delete files: the server cannot keep its log, latches and revocations"
+    return _Finding("disk", free >= LEAST_FREE, text)
 
 
 def _fleet(data: Path) -> Iterator[_Finding]:

@@ -66,6 +66,12 @@ class Outgoing:
         self._confirmed = max(self._confirmed, total)
 
 
+TWO_SERVERS: Final = (
+    "two servers use the certificate of the site; end one of them, or revoke the site"
+)
+"""Why a byte arrives twice: the network delivers each message at most once."""
+
+
 class Incoming:
     """The bytes of one direction, as their receiver sees them."""
 
@@ -78,8 +84,11 @@ class Incoming:
         """Process a message's position and bytes.
 
         Raises:
-            LineBroken: bytes before the message are missing, or the window is exceeded.
+            LineBroken: bytes before the message are missing or arrive twice, or the window is
+                exceeded.
         """
+        if at < self._received:
+            raise LineBroken(TWO_SERVERS)
         if at != self._received:
             raise LineBroken(f"{at - self._received} bytes are missing")
         self._received += len(data)

@@ -18,29 +18,35 @@ from urc.web.sites.site_client import SiteClient, SiteFailed
 
 __all__ = ["Intruder"]
 
-BERN: Final = "bern"
 _ANN: Final = Assertion("p1", "Ann", "person", "s1", "cart", "drive")
 _JSON: Final = (b"content-type", b"application/json")
 
 
 class Intruder:
-    """Sends requests to bern."""
+    """Sends requests to one site."""
 
-    def __init__(self, client: SiteClient, member: Membership) -> None:
+    def __init__(self, client: SiteClient, member: Membership, site: str) -> None:
         self._client = client
         self._member = member
+        self._site = site
 
     @classmethod
     @asynccontextmanager
     async def inside(
-        cls, member: Membership, *, claims: str = "", router: Membership | None = None
+        cls,
+        member: Membership,
+        *,
+        claims: str = "",
+        router: Membership | None = None,
+        site: str = "bern",
     ) -> AsyncIterator["Intruder"]:
         """Join the network.
 
         Args:
-            member: certificate for the lines to bern.
+            member: certificate for the lines to the site.
             claims: name on the network; "" for the name in the certificate.
             router: certificate by which the network admits this program; None for `member`.
+            site: the site that gets the requests.
         """
         hop = router or member
         options = BusOptions(
@@ -51,24 +57,24 @@ class Intruder:
         lines = Lines(bus)
         await bus.open()
         try:
-            yield cls(SiteClient(lines, lambda _: _trusting(member), site_of), member)
+            yield cls(SiteClient(lines, lambda _: _trusting(member), site_of), member, site)
         finally:
             lines.close()
             await bus.close()
 
-    async def sees_bern(self) -> None:
-        """Wait until bern is present."""
-        await until(lambda: BERN in self._client.sites)
+    async def sees_site(self) -> None:
+        """Wait until the site is present."""
+        await until(lambda: self._site in self._client.sites)
 
     def assertion(self, now: float, **changes: str) -> str:
-        """Return an assertion for bern's cart, signed by this program.
+        """Return an assertion for the site's cart, signed by this program.
 
         Args:
             now: UTC time of the signature, in seconds since 1970.
             changes: other values for `issuer`, `audience`, or fields of `Assertion`.
         """
         issuer = changes.pop("issuer", self._member.site)
-        audience = changes.pop("audience", BERN)
+        audience = changes.pop("audience", self._site)
         key = key_pem(self._member.key)
         content = replace(_ANN, **changes)  # type: ignore[arg-type]
         return sign_assertion(content, issuer=issuer, audience=audience, key_pem=key, now=now)
@@ -80,7 +86,9 @@ class Intruder:
         proof = (b"authorization", f"{SCHEME} {assertion}".encode())
         data = json.dumps(body or {}).encode()
         try:
-            asking = self._client.request(BERN, "POST", path, (proof, _JSON), data, lane="control")
+            asking = self._client.request(
+                self._site, "POST", path, (proof, _JSON), data, lane="control"
+            )
             async with asking as response:
                 return response.status, json.loads(await response.whole())
         except SiteFailed as fault:

@@ -15,9 +15,7 @@ import pytest
 from tests.e2e.fleet.counted_robot import NAME, CountedRobot
 from tests.e2e.fleet.intruder import Intruder
 from tests.e2e.fleet.two_sites import TwoSites, until_said
-from urc.fleet.authority import FleetAuthority
-from urc.fleet.files import AUTHORITY_FOLDER, FLEET_FOLDER
-from urc.fleet.joining import join, make_fleet
+from urc.fleet.joining import make_fleet
 from urc.fleet.membership import Membership
 
 pytestmark = pytest.mark.anyio
@@ -35,11 +33,7 @@ class Yard:
 
     def member(self, site: str) -> Membership:
         """Return a new site of the fleet, with a certificate of its own."""
-        now = datetime.now(UTC)
-        authority = FleetAuthority.load(self.sites.bern.data / FLEET_FOLDER / AUTHORITY_FOLDER)
-        invited = join(self._folder / site, authority.invite(site, [self.sites.address], now), now)
-        chain = authority.renew(invited.renewal(), invited.certificate, now)
-        return invited.renewed(chain, now)
+        return self.sites.member(self._folder / site)
 
     async def hears_only(self, count: int) -> None:
         """Check that the robot has heard so many horns, the last one now from bern itself."""
@@ -77,7 +71,7 @@ async def yard(tmp_path: Path) -> AsyncIterator[Yard]:
 async def test_a_site_of_the_fleet_gets_through(yard: Yard) -> None:
     """Otherwise the other tests would prove nothing."""
     async with Intruder.inside(yard.member("thun")) as thun:
-        await thun.sees_bern()
+        await thun.sees_site()
         status, said = await thun.ask(HORN, thun.assertion(time.time()))
         assert status == 200, said
     await yard.hears_only(3)
@@ -87,8 +81,8 @@ async def test_a_replayed_assertion_gets_nothing_through(yard: Yard) -> None:
     """An old one, one of another site, and one for another site."""
     zug, thun = yard.member("zug"), yard.member("thun")
     async with Intruder.inside(zug) as own, Intruder.inside(thun) as other:
-        await own.sees_bern()
-        await other.sees_bern()
+        await own.sees_site()
+        await other.sees_site()
         for sender, text, fault in (
             (
                 own,
@@ -118,14 +112,14 @@ async def test_a_forged_site_gets_nothing_through(yard: Yard) -> None:
     """The name on the network, and the name in an assertion."""
     zug = yard.member("zug")
     async with Intruder.inside(zug, claims="chur") as forged:
-        await forged.sees_bern()
+        await forged.sees_site()
         status, said = await forged.ask(HORN, forged.assertion(time.time()))
         fault = "the certificate is for the site zug, not chur"
         assert status == 0
         assert said["message"].endswith(fault)
         await yard.logs(f"a line of the site chur is refused: {fault}")
     async with Intruder.inside(zug) as forged:
-        await forged.sees_bern()
+        await forged.sees_site()
         fault = "the assertion is from or for another site"
         text = forged.assertion(time.time(), issuer="bern")
         assert await forged.ask(HORN, text) == (403, _forbidden(fault))
@@ -147,7 +141,7 @@ async def test_a_foreign_certificate_gets_nothing_through(yard: Yard, tmp_path: 
         status, said = await mill.ask(HORN, mill.assertion(time.time()))
         assert (status, said["message"]) == (0, "the site bern cannot be reached")
     async with Intruder.inside(outside, router=zug) as mill:
-        await mill.sees_bern()
+        await mill.sees_site()
         status, said = await mill.ask(HORN, mill.assertion(time.time()))
         assert status == 0
         await yard.logs(

@@ -8,6 +8,7 @@ import signal
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
+from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,6 +21,10 @@ from tests.e2e.keys import with_key
 from tests.e2e.ports import free_pair, free_port
 from tests.e2e.processes import UrcProcess
 from urc.client.remote import RemoteRobot
+from urc.fleet.authority import FleetAuthority
+from urc.fleet.files import AUTHORITY_FOLDER, FLEET_FOLDER
+from urc.fleet.joining import join
+from urc.fleet.membership import Membership
 from urc.problems import UrcError
 
 __all__ = ["FAST", "ROBOT", "SLOW", "WAIT_S", "Site", "TwoSites", "reaches", "until_said"]
@@ -125,9 +130,17 @@ class TwoSites:
         """Address by which zug reaches bern."""
         listen = f"127.0.0.1:{self.port}"
         self.bern.command("fleet", "init", "lab", "--site", "bern", "--listen", listen)
-        self.zug.data.mkdir(parents=True)
+        self.zug.data.mkdir(parents=True, exist_ok=True)
         code = self.bern.command("fleet", "invite", "zug", "--address", self.address)
         self.zug.command("fleet", "join", code)
+
+    def member(self, folder: Path) -> Membership:
+        """Return another site of the fleet, with the name of its folder and no server."""
+        now = datetime.now(UTC)
+        authority = FleetAuthority.load(self.bern.data / FLEET_FOLDER / AUTHORITY_FOLDER)
+        invited = join(folder, authority.invite(folder.name, [self.address], now), now)
+        chain = authority.renew(invited.renewal(), invited.certificate, now)
+        return invited.renewed(chain, now)
 
     def start(self) -> None:
         """Start both servers."""

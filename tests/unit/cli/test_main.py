@@ -280,7 +280,7 @@ def test_doctor_tells_what_is_missing(
         "MISSING robots                No module named 'yaml'",
     ):
         assert line in output.splitlines()
-    assert errors == "urc doctor: 6 of 15 checks failed\n"
+    assert errors == "urc doctor: 6 of 16 checks failed\n"
 
 
 def test_doctor_shows_the_authority(

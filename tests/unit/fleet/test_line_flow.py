@@ -56,6 +56,14 @@ def test_a_gap_breaks_the_line() -> None:
         incoming.receive(5, b"d")
 
 
+def test_bytes_that_arrive_twice_have_two_senders() -> None:
+    """The network delivers a message once, so a copied certificate is in use."""
+    incoming = Incoming()
+    incoming.receive(0, b"abc")
+    with pytest.raises(LineBroken, match="two servers use the certificate of the site"):
+        incoming.receive(0, b"abc")
+
+
 def test_a_sender_that_ignores_the_window_breaks_the_line() -> None:
     """Received bytes that nobody reads are bounded."""
     incoming = Incoming()

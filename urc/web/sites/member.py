@@ -21,6 +21,7 @@ from urc.fleet.joining import renew_own
 from urc.fleet.membership import Membership
 from urc.fleet.names import FleetError
 from urc.fleet.reach import reach_faults
+from urc.fleet.revocations import RevocationList
 from urc.web.serve.site_peer import CERTIFICATE, SitePeer, site_of
 from urc.web.sites.site_client import SiteClient, SiteFailed
 
@@ -135,10 +136,14 @@ class Member:
         Raises:
             FleetError: the list is not from this fleet's authority.
         """
-        if self._authority is not None:  # after the restore of a backup, sites know more
-            self._authority.merge_revocations(signed)
-        self._membership.take_revocations(signed)
-        newest = self._membership.revocations()  # another process may have stored it already
+        newest = RevocationList.verified(signed, self._membership.root)
+        try:
+            if self._authority is not None:  # after the restore of a backup, sites know more
+                self._authority.merge_revocations(signed)
+            self._membership.take_revocations(signed)
+            newest = self._membership.revocations()  # another process may have stored a newer list
+        except FleetError as fault:  # such as a full disk: the list counts all the same
+            log.warning("the revocation list is lost when this server ends: %s", fault)
         if newest.number <= self._revoked.number:
             return False
         self._revoked = newest
@@ -185,8 +190,13 @@ class Member:
             stamp = _stamp(authority.revocations_file)
             if stamp != seen:
                 seen = stamp
-                signed = await asyncio.to_thread(authority.signed_revocations)
-                if signed and self.take_revocations(signed):
+                try:
+                    signed = await asyncio.to_thread(authority.signed_revocations)
+                    is_newer = self.take_revocations(signed)
+                except FleetError as fault:
+                    log.warning("%s", fault)
+                    continue
+                if is_newer:
                     await asyncio.gather(
                         *(self._send(client, site, signed) for site in client.sites)
                     )
