@@ -48,6 +48,7 @@ NAMES = (
     "motion_foxglove",
     "motion_zenoh",
     "fleet_cuts",
+    "fleet_overload",
     "fleet_ticks",
     "fleet_size",
     "fleet_soak",

@@ -22,7 +22,7 @@ from bench.rig.operator_process import Plan
 from bench.rig.programs import HERE, Program, Robots, Server, peer
 from tests.e2e.ports import free_pair
 
-__all__ = ["run"]
+__all__ = ["driven", "run"]
 
 TICKS, TICKS_IF_FULL = 150, 300
 ROUNDS, ROUNDS_IF_FULL = 3, 9
@@ -88,14 +88,14 @@ def _fleet(ticks: int) -> Iterator[_Round]:
 
         def one_round() -> dict[str, list[float]]:
             return {
-                NEAR: _driven(own.server, "path", robots, ticks),
-                FAR: _driven(other.server, "path@mill", robots, ticks),
+                NEAR: driven(own.server, "path", robots, ticks),
+                FAR: driven(other.server, "path@mill", robots, ticks),
             }
 
         yield one_round
 
 
-def _driven(server: Server, robot: str, robots: Robots, ticks: int) -> list[float]:
+def driven(server: Server, robot: str, robots: Robots, ticks: int) -> list[float]:
     """Return the time of each tick from a new page to the robot, in milliseconds."""
     end_s = time.monotonic() + START_S
     while True:  # the sites may not have found each other
