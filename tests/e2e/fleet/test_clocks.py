@@ -1,6 +1,8 @@
 """A site whose clock is a day off: nothing reaches a robot, and one line says why."""
 
+import json
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 from tests.e2e.fleet.counted_robot import NAME, CountedRobot
 from tests.e2e.fleet.two_sites import TwoSites, until_said
 from tests.e2e.fleet.wrong_clock import clock
+from urc.fleet.files import AUTHORITY_FOLDER, FLEET_FOLDER
 
 pytestmark = pytest.mark.needs("faketime")
 DAY_S = 86400
@@ -77,3 +80,16 @@ def test_a_clock_a_day_behind_is_named_at_the_start_and_by_doctor(cart: Cart) ->
     assert (status, said["message"]) == (502, "the site bern cannot be reached")
     assert sites.zug.ask(f"{ROBOT}/stop", {})[0] == 502
     assert cart.robot.heard == ["horn"]
+
+
+def test_a_clock_days_ahead_renews_a_certificate_once(cart: Cart) -> None:
+    """Each new certificate is half over at once; the authority's list must not grow for ever."""
+    sites = cart.sites
+    ledger = sites.bern.data / FLEET_FOLDER / AUTHORITY_FOLDER / "issued.json"
+    before = len(json.loads(ledger.read_bytes())["entries"])
+    sites.zug.environment = clock(5 * DAY_S)
+    sites.zug.start()
+    assert sites.zug.process is not None
+    sites.zug.process.wait_for("the new certificate of this site is half over already: the clock")
+    time.sleep(12.0)  # longer than the interval between attempts
+    assert len(json.loads(ledger.read_bytes())["entries"]) == before + 1

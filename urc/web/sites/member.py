@@ -32,6 +32,12 @@ _LOOK_S: Final = 0.1
 """Interval between checks of the authority's revocation list, in seconds."""
 _RENEW_S: Final = 10.0
 """Interval between attempts to renew the certificate, in seconds."""
+_WRONG_CLOCK_S: Final = 3600.0
+"""The same if the new certificate is old already, in seconds."""
+_AHEAD: Final = (
+    "the new certificate of this site is half over already: the clock of this computer is days"
+    " ahead of the authority's clock; set the wrong clock"
+)
 _ALONE_S: Final = 5.0
 """Interval between checks whether this site has reached its fleet, in seconds."""
 
@@ -218,6 +224,7 @@ class Member:
 
     async def _keep_certificate(self, client: SiteClient) -> None:
         while True:
+            pause_s = _RENEW_S
             if self._membership.is_renewal_due(self._utc()):
                 try:
                     await self._renew(client)
@@ -226,9 +233,13 @@ class Member:
                     is_refused = self._membership.authority in client.sites
                     level = logging.WARNING if is_refused else logging.INFO
                     log.log(level, "the certificate of this site was not renewed: %s", fault)
+                else:
+                    if self._membership.is_renewal_due(self._utc()):
+                        pause_s = _WRONG_CLOCK_S
+                        log.warning("%s", _AHEAD)
             self._news.clear()
             with suppress(TimeoutError):
-                async with asyncio.timeout(_RENEW_S):
+                async with asyncio.timeout(pause_s):
                     await self._news.wait()
 
     async def _renew(self, client: SiteClient) -> None:
