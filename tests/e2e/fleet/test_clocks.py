@@ -90,6 +90,6 @@ def test_a_clock_days_ahead_renews_a_certificate_once(cart: Cart) -> None:
     sites.zug.environment = clock(5 * DAY_S)
     sites.zug.start()
     assert sites.zug.process is not None
-    sites.zug.process.wait_for("the new certificate of this site is half over already: the clock")
+    sites.zug.process.wait_for("the new certificate of this site is half over already: this clock")
     time.sleep(12.0)  # longer than the interval between attempts
     assert len(json.loads(ledger.read_bytes())["entries"]) == before + 1

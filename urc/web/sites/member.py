@@ -35,8 +35,8 @@ _RENEW_S: Final = 10.0
 _WRONG_CLOCK_S: Final = 3600.0
 """The same if the new certificate is old already, in seconds."""
 _AHEAD: Final = (
-    "the new certificate of this site is half over already: the clock of this computer is days"
-    " ahead of the authority's clock; set the wrong clock"
+    "the new certificate of this site is half over already: this clock is days ahead of the"
+    " authority's clock; set the wrong clock"
 )
 _ALONE_S: Final = 5.0
 """Interval between checks whether this site has reached its fleet, in seconds."""
