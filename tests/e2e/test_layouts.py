@@ -1,14 +1,12 @@
 """Interfaces in a real browser: by screen, by hand, in tabs, over a picture, and one for faults."""
 
 import asyncio
-import io
 import json
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from PIL import Image
 from playwright.async_api import FloatRect, Locator, Page, expect
 
 from tests.e2e.conftest import PageMaker
@@ -22,7 +20,7 @@ from tests.e2e.dashboards import (
     until_text,
 )
 from tests.e2e.dev_pages import served
-from tests.e2e.drawn import RED, plain, until_pixel
+from tests.e2e.drawn import RED, plain, until_seen
 from tests.e2e.motion.driving import (
     CALM_LEASE_S,
     USES,
@@ -337,32 +335,35 @@ async def test_the_background_fills_the_stage_with_the_widgets_in_front(
             assert seen["height"] == 32
 
 
-async def test_a_dimmed_copy_surrounds_a_picture_that_does_not_fill_the_page(
-    new_page: PageMaker,
-) -> None:
-    """It does not look like a part of the picture, and fades out over the picture's edge."""
+async def test_the_background_shows_the_whole_image_or_fills_the_page(new_page: PageMaker) -> None:
+    """The device keeps the choice; beside the whole image, the page has its own colour."""
     signals = {"front": Signal("front", "image")}
     uses = [USES[0], WidgetUse("front", "camera", {"image": "front"})]
     profile = dashboard_profile(signals=signals, uses=uses, commands=commands(CALM_LEASE_S))
     interface = Interface("d", "Drive", {"landscape": row("left")}, background="front")
     robot = FakeRobot(profile._replace(interfaces={"d": interface}))
     async with running_dashboard(robot) as address:
-        page = await new_page()
+        page = await new_page(size="desktop", theme="light")
         await page.goto(f"{address}robots/puppet/")
         await until(lambda: robot.is_open)
         robot.set_reading("front", plain(RED))
-        await turned(page, PHONE_LYING)
-        await until_pixel(page, ".camera-surround", 0.1, 0.5, "r > 70 && r < 90 && g < 10")
-        await until_pixel(page, ".camera-surround", 0.99, 0.5, "a < 10")
-        shot = Image.open(io.BytesIO(await page.locator(".camera-face").screenshot()))
-        seen = shot.convert("RGB").getpixel((shot.width // 100, shot.height // 2))
-        assert isinstance(seen, tuple)
-        assert 40 < seen[0] < 120
-        assert max(seen[1:]) < 40
-        for filled in ((800, 660), PHONE):
-            await turned(page, filled)
-            for strip in await page.locator(".camera-surround").all():
-                await expect(strip).to_be_hidden()
+        for edge, colour in ((0.02, (232, 235, 238)), (0.2, RED), (0.8, RED)):
+            await until_seen(page, ".camera-face", edge, 0.5, colour)
+        await page.get_by_role("button", name="Fill the page with the picture").click()
+        for edge in (0.02, 0.98):
+            await until_seen(page, ".camera-face", edge, 0.5, RED)
+        await turned(page, TABLET)
+        await until_seen(page, ".camera-face", 0.9, 0.04, RED)
+        await page.reload()
+        await expect(page.locator("[data-badge]")).to_have_attribute("data-state", "good")
+        robot.set_reading("front", plain(RED))
+        await until_seen(page, ".camera-face", 0.9, 0.04, RED)
+        await page.get_by_role("button", name="Fit the whole picture").click()
+        await until_seen(page, ".camera-face", 0.9, 0.04, (232, 235, 238))
+        await until_seen(page, ".camera-face", 0.5, 0.5, RED)
+        await turned(page, PHONE)
+        fill = page.get_by_role("button", name="Fill the page with the picture")
+        await expect(fill).to_be_visible()
 
 
 async def test_a_tap_on_a_view_swaps_it_with_the_background(new_page: PageMaker) -> None:

@@ -3,7 +3,6 @@ import { test } from "node:test";
 import { deflateSync } from "node:zlib";
 import { colour, palette, pixel } from "../../urc/web/static/widgets/colour_map.js";
 import { Rate, ageText, fileName, lookOf, place } from "../../widgets/camera/frame.js";
-import { strips } from "../../widgets/camera/surround.js";
 import { arrayField, paint, pixelAt, probe, rawField, readField } from "../../widgets/depth/field.js";
 import {
   Trail, bearingOf, distance, gridStep, headingText, isInside, lengthOf, perMetre, placeOf, placeText, placesOf, readFix, sexagesimal,
@@ -270,39 +269,34 @@ test("a picture fits its box whichever way it is turned", () => {
   assert.deepEqual([filled.width, filled.height], [400, 100]);
 });
 
-test("a picture fills the page where it keeps three quarters of itself; otherwise the picture is whole", () => {
+test("a picture in the background is whole, unless it would take less than 73 % of it", () => {
   const look = { fit: /** @type {const} */ ("ground"), rotate: 0, mirror: false };
   const camera = { width: 400, height: 300 };
-  // A tablet of nearly the same shape: filled, without some of the upper edge.
-  const tablet = place(camera, { width: 1200, height: 830 }, look);
-  assert.deepEqual([tablet.width, tablet.height, tablet.y + tablet.height / 2], [1200, 900, 830]);
-  // A desktop of 16:10: filled, it loses a fifth.
+  // A desktop of 16:10: whole, with bars at the sides.
   const desktop = place(camera, { width: 1440, height: 852 }, look);
-  allNear([desktop.width, desktop.height, desktop.y + desktop.height / 2], [1440, 1080, 852]);
-  // A low phone: filled, it would lose half of its height, so the image is whole and the sides are its surround.
+  allNear([desktop.width, desktop.height, desktop.x, desktop.y], [1136, 852, 720, 426]);
+  // A low phone: whole, the image would take 54 %, so it loses a quarter at its upper edge.
   const low = place(camera, { width: 844, height: 342 }, look);
-  allNear([low.width, low.height, low.x, low.y], [456, 342, 422, 171]);
-  // A box that is higher than the image loses the sides, in equal parts.
-  const tall = place(camera, { width: 380, height: 300 }, look);
-  assert.deepEqual([tall.x, tall.y, tall.width, tall.height], [190, 150, 400, 300]);
+  allNear([low.width, low.height, low.x, low.y + low.height / 2], [608, 456, 422, 342]);
+  // A tablet in portrait: enlarged, the image loses its sides, in equal parts.
+  const tall = place(camera, { width: 820, height: 1132 }, look);
+  allNear([tall.x, tall.y, tall.width, tall.height], [410, 566, (4 / 3) * 820, 820]);
+  // A very low page: a quarter of the image is lost at most.
+  const flat = place(camera, { width: 2000, height: 300 }, look);
+  allNear([flat.width, flat.height, flat.y + flat.height / 2], [400 * (4 / 3), 400, 300]);
   // On its side, its lower edge on the screen is a side of the image.
-  const lying = place(camera, { width: 300, height: 380 }, { ...look, rotate: 90 });
-  assert.deepEqual([lying.width, lying.height, lying.y], [400, 300, 180]);
+  const lying = place(camera, { width: 300, height: 900 }, { ...look, rotate: 90 });
+  allNear([lying.width, lying.height, lying.y], [400 * (4 / 3), 400, 450]);
   // As large as its box, the image is where it was.
   assert.equal(place(camera, { width: 800, height: 600 }, look).y, 300);
 });
 
-test("strips surround an image that does not fill the page, with a soft edge over the image", () => {
-  const page = { width: 844, height: 342 };
-  assert.equal(strips(page, { width: 844, height: 342 }), null);
-  assert.deepEqual(strips(page, { width: 456, height: 342 }), [
-    { left: 0, top: 0, width: 258, height: 342 },
-    { left: 586, top: 0, width: 258, height: 342 },
-  ]);
-  assert.deepEqual(strips({ width: 800, height: 1000 }, { width: 800, height: 600 }), [
-    { left: 0, top: 0, width: 800, height: 264 },
-    { left: 0, top: 736, width: 800, height: 264 },
-  ]);
+test("a picture that fills the page loses its upper edge, never the ground next to the robot", () => {
+  const look = { fit: /** @type {const} */ ("filled"), rotate: 0, mirror: false };
+  const desktop = place({ width: 400, height: 300 }, { width: 1440, height: 852 }, look);
+  allNear([desktop.width, desktop.height, desktop.y + desktop.height / 2], [1440, 1080, 852]);
+  const tall = place({ width: 400, height: 300 }, { width: 380, height: 300 }, look);
+  assert.deepEqual([tall.x, tall.y, tall.width, tall.height], [190, 150, 400, 300]);
 });
 
 test("a camera turns against the finger, never further than all the way", () => {

@@ -2,8 +2,8 @@
 /**
  * The placement of an image in its box. Pure: no DOM.
  *
- * @typedef {"contain" | "cover" | "fill" | "ground"} Fit "ground": as "cover", but with the lower edge of the
- *   image; as "contain" if more than a quarter of the image were lost
+ * @typedef {"contain" | "cover" | "fill" | "ground" | "filled"} Fit "ground": as "contain", but enlarged where the
+ *   image would take less than `LEAST_SHARE` of the box; "filled": as "cover". Both keep the lower edge.
  * @typedef {object} Size
  * @property {number} width
  * @property {number} height
@@ -17,7 +17,9 @@
  * @property {number} flip -1 if it is mirrored
  */
 
-/** Maximum enlargement of an image that fills the background: three quarters of the image stay visible. */
+/** Share of the background that an image takes at least. */
+const LEAST_SHARE = 0.73;
+/** Maximum enlargement for this share: three quarters of the image stay visible. */
 const MOST_ZOOM = 4 / 3;
 
 /**
@@ -33,14 +35,14 @@ export function place(picture, box, { fit, rotate, mirror }) {
   const [wide, high] = [box.width / Math.max(1, across), box.height / Math.max(1, down)];
   const whole = Math.min(wide, high);
   const filled = Math.max(wide, high);
-  const isFilled = fit === "cover" || (fit === "ground" && filled <= whole * MOST_ZOOM);
-  const scale = isFilled ? filled : whole;
+  const isFilled = fit === "cover" || fit === "filled";
+  const scale = isFilled ? filled : fit === "ground" ? groundScale(whole, filled) : whole;
   const [scaleX, scaleY] = fit === "fill" ? [wide, high] : [scale, scale];
   const [width, height] = isLying
     ? [picture.width * scaleY, picture.height * scaleX]
     : [picture.width * scaleX, picture.height * scaleY];
   // The ground next to the robot is at the lower edge of the image, so the upper edge is lost.
-  const lostPx = fit === "ground" ? Math.max(0, down * scaleY - box.height) : 0;
+  const lostPx = fit === "ground" || fit === "filled" ? Math.max(0, down * scaleY - box.height) : 0;
   return {
     x: box.width / 2,
     y: (box.height - lostPx) / 2,
@@ -49,6 +51,16 @@ export function place(picture, box, { fit, rotate, mirror }) {
     height,
     flip: mirror ? -1 : 1,
   };
+}
+
+/**
+ * Return the scale of an image that is whole, unless it would take too little of the background.
+ *
+ * @param {number} whole scale at which the whole image fits; it then takes the share `whole / filled` of its box
+ * @param {number} filled scale at which the image fills its box
+ */
+function groundScale(whole, filled) {
+  return Math.max(whole, Math.min(LEAST_SHARE * filled, MOST_ZOOM * whole));
 }
 
 /**

@@ -9,7 +9,6 @@ import { DASH, attribute, button, faultOf, many, noteOf, part, write } from "urc
 import { Rate, ageText, fileName, lookOf, place } from "./frame.js";
 import { Newest } from "./newest.js";
 import { Screen } from "./screen.js";
-import { Surround } from "./surround.js";
 
 /** Whether the screen has room for signs only, such as a phone in landscape. */
 const isLow = () => matchMedia("(height < 30rem)").matches;
@@ -18,6 +17,8 @@ const LOOK_AGAIN_MS = 200;
 const FULL_COLOUR_MS = 5000;
 const KEYS = ["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"];
 const KEY_LEVEL = 0.5;
+/** Key under which the device stores whether the background shows the image whole. */
+const KEPT_FIT = "urc-picture-fit";
 
 export default {
   /**
@@ -54,7 +55,6 @@ class Camera {
     this.canvas = canvas;
     this.cross = el.querySelector(".camera-cross");
     this.screen = new Screen(canvas);
-    this.surround = new Surround([...el.querySelectorAll(".camera-surround")].filter((one) => one instanceof HTMLCanvasElement));
     this.look = {
       fit: /** @type {Fit | "auto"} */ (options["fit"] ?? "auto"),
       rotate: Number(options["rotate"] ?? 0),
@@ -78,7 +78,6 @@ class Camera {
         this.rate?.add(performance.now() / 1000);
         if (this.screen.show(bitmap)) this.draw();
         ctx.shown(picture);
-        this.surround.follow(this.canvas, this.look);
         if (this.shutter) this.shutter.disabled = false;
         this.tell();
       },
@@ -92,6 +91,7 @@ class Camera {
       this.isWhole = !this.isWhole;
       this.draw();
     }, { signal: this.signal });
+    this.addFit();
     if (options["snapshot"] !== false) this.addSnapshot();
     this.addFullColour();
     if (this.face.tabIndex === 0) this.addHold(ctx);
@@ -217,10 +217,41 @@ class Camera {
   /** @returns {Fit} */
   fit() {
     const { fit } = this.look;
-    if (fit !== "auto") return fit;
-    if (!this.isGround() || this.isWhole) return "contain";
-    // There, the widgets are below the picture, which takes the whole width.
-    return isUprightPhone() ? "cover" : "ground";
+    if (!this.isGround()) return fit === "auto" ? "contain" : fit;
+    if (this.isWhole) return "contain";
+    if (fit !== "auto" && !this.choice) return fit;
+    // On a phone in portrait, the widgets are below the picture, which takes the whole width.
+    if (isUprightPhone()) return this.choice === "fit" ? "contain" : "cover";
+    return this.choice === "fill" ? "filled" : "ground";
+  }
+
+  /** Add the switch that lets the background show the image whole, or fill the page with it. */
+  addFit() {
+    this.choice = keptChoice();
+    this.fitter = this.addButton("", "", () => {
+      const choice = this.isFilled() ? "fit" : "fill";
+      this.choice = choice;
+      this.isWhole = false;
+      keepChoice(choice);
+      this.draw();
+    });
+    this.tellFit();
+  }
+
+  isFilled() {
+    const fit = this.fit();
+    return fit !== "ground" && fit !== "contain";
+  }
+
+  /** Name what a press of the switch does; in a cell, there is no switch. */
+  tellFit() {
+    if (!this.fitter) return;
+    const isFilled = this.isFilled();
+    this.fitter.hidden = !this.isGround();
+    write(this.fitter, isFilled ? this.t("Fit") : this.t("Fill"));
+    const name = isFilled ? this.t("Fit the whole picture") : this.t("Fill the page with the picture");
+    attribute(this.fitter, "aria-label", name);
+    attribute(this.fitter, "title", name);
   }
 
   isGround() {
@@ -229,6 +260,7 @@ class Camera {
 
   /** Place the image in its box. The browser scales the image, so that no frame must be redrawn. */
   draw() {
+    this.tellFit();
     const size = { width: this.face.clientWidth, height: this.face.clientHeight };
     const { shown } = this.pictures;
     if (!shown || size.width === 0 || size.height === 0) return;
@@ -237,10 +269,6 @@ class Camera {
     style.width = `${width}px`;
     style.height = `${height}px`;
     style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
-    const isLying = angle % Math.PI !== 0;
-    const [wide, high] = isLying ? [height, width] : [width, height];
-    this.surround.lay(size, this.isGround() ? { width: wide, height: high } : null);
-    this.surround.follow(this.canvas, this.look);
     // The crosshair marks the middle of the image.
     if (this.cross instanceof SVGElement) this.cross.style.transform = `translateY(${y - size.height / 2}px)`;
   }
@@ -316,5 +344,24 @@ class Camera {
   end() {
     clearInterval(this.timer);
     this.pictures.end();
+  }
+}
+
+/** @returns {"fit" | "fill" | null} null before a choice on this device */
+function keptChoice() {
+  try {
+    const kept = localStorage.getItem(KEPT_FIT);
+    return kept === "fit" || kept === "fill" ? kept : null;
+  } catch {
+    return null;
+  }
+}
+
+/** @param {"fit" | "fill"} choice */
+function keepChoice(choice) {
+  try {
+    localStorage.setItem(KEPT_FIT, choice);
+  } catch {
+    // In private mode, the choice lasts until the page closes.
   }
 }

@@ -12,7 +12,11 @@
   const band = bands ? boxOf(bands) : new DOMRect();
   const picture = document.querySelector('[data-place="ground"]');
   const view = picture ? boxOf(picture) : new DOMRect();
-  let [ground, inside, bars, seen] = [0, 0, 0, 0];
+  // The bars next to a camera's image are no picture.
+  const canvas = picture?.querySelector(".camera-picture");
+  const shown = canvas && boxOf(canvas).width > 0 ? boxOf(canvas) : view;
+  const isIn = (box, x, y) => x >= box.left && x < box.right && y >= box.top && y < box.bottom;
+  let [ground, image, inside, bars, seen] = [0, 0, 0, 0, 0];
   for (let y = STEP / 2; y < innerHeight; y += STEP) {
     if (y >= band.top && y < band.bottom) continue;
     for (let x = STEP / 2; x < innerWidth; x += STEP) {
@@ -21,8 +25,10 @@
         continue;
       }
       inside += 1;
-      seen += Number(x >= view.left && x < view.right && y >= view.top && y < view.bottom);
-      ground += Number(Boolean(document.elementFromPoint(x, y)?.closest('[data-place="ground"]')));
+      seen += Number(isIn(view, x, y) && isIn(shown, x, y));
+      const isFree = Boolean(document.elementFromPoint(x, y)?.closest('[data-place="ground"]'));
+      ground += Number(isFree);
+      image += Number(isFree && isIn(shown, x, y));
     }
   }
   const faults = [];
@@ -103,7 +109,8 @@
   const isOverGround = document.querySelector('[data-place="ground"]') !== null;
   return {
     ground: Math.round((100 * ground) / inside),
-    clear: Math.round((100 * ground) / Math.max(1, seen)),
+    image: Math.round((100 * image) / inside),
+    clear: Math.round((100 * image) / Math.max(1, seen)),
     bars: Math.round((1000 * bars) / (bars + inside)) / 10,
     isPicture: document.querySelector('[data-place="ground"][data-picture]') !== null,
     isOverGround, scrolls, faults, edges, sizes, gap,

@@ -28,6 +28,10 @@ SCREENS = {
 }
 WIDE = ("phone, landscape", "tablet", "tablet, landscape", "desktop", "large")
 """Screens on which widgets are in front of the background."""
+IMAGE_PERCENT = 55
+"""Least share of the stage that a camera's image takes without its bars and below no widget."""
+LOW_IMAGE_PERCENT = 45
+"""The same on a phone in landscape: there, more would cost more than a quarter of the image."""
 CLEAR_PERCENT = 60
 """Least share of the camera that no widget covers on a phone in portrait."""
 STICK_PX = (143, 221)
@@ -111,6 +115,9 @@ def faults(seen: dict[str, Any], screen: str, is_large: bool) -> list[str]:
         lines.append("the page scrolls, so widgets can be next to STOP")
     if seen["isPicture"] and seen["ground"] < 55:
         lines.append(f"the camera has {seen['ground']} % of the stage")
+    least = LOW_IMAGE_PERCENT if "phone, " in screen else IMAGE_PERCENT
+    if seen["isPicture"] and seen["image"] < least:
+        lines.append(f"the image has {seen['image']} % of the stage")
     if any(size < STICK_PX[0] or size > STICK_PX[1] for size in seen["sizes"]):
         lines.append(f"sticks are {seen['sizes']} px wide")
     if any(not 8 <= edge <= 32 for edge in seen["edges"]):
