@@ -1,12 +1,14 @@
 """The button of a small screen for the widgets that its layout lacks."""
 
+import re
+
 import pytest
 from playwright.async_api import expect
 
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard, turned, until
 from tests.e2e.motion.driving import LEFT, UP, driven, opened, push
-from tests.e2e.test_layouts import PHONE_LYING, gauged, row, steered
+from tests.e2e.test_layouts import PHONE, PHONE_LYING, TABLET, gauged, row, steered
 from urc.model.interface import Interface
 from urc.model.values import AlarmLimits, Signal
 from urc.testing.dashboard import FakeRobot
@@ -26,9 +28,9 @@ async def test_a_button_lists_the_widgets_that_a_small_screen_lacks_and_leads_to
         await turned(page, PHONE_LYING)
         await expect(page.locator(UP)).to_be_hidden()
         await expect(more).to_have_attribute("aria-pressed", "false")
-        await expect(more).to_have_text("+2")
-        await expect(more).to_have_attribute("title", "2 more widgets")
-        await expect(more).to_have_accessible_name("2 more widgets")
+        await expect(more).to_have_text("More (2)")
+        await expect(more).to_have_attribute("title", re.compile(r"^More \(2\): .+, Lift$"))
+        await expect(more).to_have_accessible_name(re.compile(r"^More \(2\): "))
         await push(page)
         await robot.until_moving()
         await more.focus()
@@ -70,9 +72,26 @@ async def test_the_button_for_missing_widgets_marks_those_with_an_alarm(
         await until(lambda: robot.is_open)
         await turned(page, PHONE_LYING)
         more = page.locator("[data-rest]")
-        await expect(more).to_have_text("+2")
+        await expect(more).to_have_text("More (2)")
         robot.set_reading("c", 5, alarm="hihi")
-        await expect(more).to_have_text("+2▲")
-        await expect(more).to_have_accessible_name("2 more widgets · Alarm")
+        await expect(more).to_have_text("More (2) ▲")
+        await expect(more).to_have_accessible_name("More (2): B, C · Alarm")
         await more.click()
         await expect(page.locator("[data-rest-list] > button")).to_have_text(["B", "▲ C"])
+
+
+async def test_the_button_has_the_name_that_the_interface_gives_to_the_missing_widgets(
+    new_page: PageMaker,
+) -> None:
+    """The name of the drawer, if it has all of them; a narrow screen has room for one word."""
+    sticks = row("left", "right", "up")
+    grids = {"landscape": sticks, "portrait": row("left"), "phone_landscape": row("left")}
+    interface = Interface("x", "X", grids, background="left", drawer="Arms")
+    async with driven(robot=steered(interface)) as (_, address):
+        page = await opened(new_page, address)
+        more = page.locator("[data-rest]")
+        await turned(page, TABLET)
+        await expect(more).to_have_text("Arms")
+        await expect(more).to_have_accessible_name(re.compile(r"^Arms: .+, Lift$"))
+        await turned(page, PHONE)
+        await expect(more).to_have_text("More")

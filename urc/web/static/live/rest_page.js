@@ -11,6 +11,8 @@ import { SIGNS } from "../core/alarm_signs.js";
 /** @typedef {import("../core/types.js").AlarmPriority} AlarmPriority */
 
 const REST = "-rest";
+/** Screens whose bar has room for one short word. */
+const NARROW = "(width < 37.5rem)";
 /** @type {readonly AlarmPriority[]} */
 const WORST_FIRST = ["high", "medium", "low"];
 
@@ -69,7 +71,7 @@ export class RestPage {
     const { button, list } = this;
     const numbers = getComputedStyle(button).getPropertyValue("--urc-rest").split(" ").filter(Boolean);
     this.cells = numbers.map((one) => this.stage.querySelector(`[data-cell="${one}"]`)).filter((el) => el instanceof HTMLElement);
-    const { restOne = "", restMany = "", restBack = "", restAlarm = "" } = button.dataset;
+    const { restBack = "", restAlarm = "" } = button.dataset;
     button.setAttribute("aria-pressed", String(this.isRest));
     if (this.isRest) button.removeAttribute("popovertarget");
     else button.setAttribute("popovertarget", list.id);
@@ -78,12 +80,22 @@ export class RestPage {
     list.replaceChildren(...this.cells.map((cell, at) => this.item(cell, alarms[at] ?? "")));
     const worst = this.isRest ? "" : WORST_FIRST.find((one) => alarms.includes(one)) ?? "";
     button.toggleAttribute("data-alarm", worst !== "");
-    button.textContent = this.isRest ? "←" : `+${this.cells.length}${worst && SIGNS[worst]}`;
-    const count = String(this.cells.length);
-    const words = this.isRest ? restBack : count === "1" ? restOne : restMany.replace("{count}", count);
-    const title = worst ? `${words} · ${restAlarm}` : words;
+    const words = this.words();
+    button.textContent = this.isRest ? "←" : [words, worst && SIGNS[worst]].filter(Boolean).join(" ");
+    const names = `${words}: ${this.cells.map(titleOf).join(", ")}`;
+    const title = this.isRest ? restBack : worst ? `${names} · ${restAlarm}` : names;
     button.title = title;
     button.setAttribute("aria-label", title);
+  }
+
+  /** Return the interface's name for the missing widgets; else “More”, with their number where there is room. */
+  words() {
+    const more = this.button.dataset["restMore"] ?? "";
+    if (matchMedia(NARROW).matches) return more;
+    const drawers = new Set(this.cells.map((cell) => cell.closest("[data-drawer-name]")));
+    const drawer = drawers.size === 1 ? [...drawers][0] : null;
+    if (drawer instanceof HTMLElement) return drawer.dataset["drawerName"] ?? more;
+    return `${more} (${this.cells.length})`;
   }
 
   /**
