@@ -9,6 +9,7 @@ from tests.e2e.axe import faults, prepare
 from tests.e2e.browser import SIZES, Size, choose_theme
 from tests.e2e.conftest import PageMaker
 from tests.e2e.dashboards import running_dashboard
+from tests.e2e.motion.driving import CALM_LEASE_S, Wire
 from tests.e2e.test_languages import CUT
 from tests.unit.runtime.desks import DRIVER
 from urc.testing.dashboard import FakeRobot, dashboard_profile
@@ -82,6 +83,27 @@ async def test_a_robot_without_a_link_is_named_until_it_has_stopped(new_page: Pa
         backend.write_due()
         await expect(note(page)).to_have_text("✓ 3 of 3 stopped", timeout=PATIENCE_MS)
         await expect(card(page, "cart-2")).to_contain_text("■ Stopped ✓")
+
+
+async def test_stop_is_quiet_until_a_robot_is_connected_and_works_nevertheless(
+    new_page: PageMaker,
+) -> None:
+    """The state without a connection must not be the loudest part of the menu."""
+    robots = [Wire(lease_s=CALM_LEASE_S), *carts(1, still=1)]
+    async with running_dashboard(*robots) as address:
+        menu, other = await new_page(), await new_page()
+        await menu.goto(address)
+        await expect(stop(menu)).to_have_attribute("data-quiet", "")
+        await other.goto(f"{address}robots/still-0/")
+        await expect(card(menu, "still-0")).to_contain_text("Live", timeout=PATIENCE_MS)
+        await expect(stop(menu)).to_have_attribute("data-quiet", "")
+        await other.goto(f"{address}robots/puppet/")
+        await expect(stop(menu)).not_to_have_attribute("data-quiet", "", timeout=PATIENCE_MS)
+        await other.close()
+        await expect(stop(menu)).to_have_attribute("data-quiet", "", timeout=PATIENCE_MS)
+        await stop(menu).click()
+        await expect(note(menu)).to_have_text("✓ 2 of 2 stopped")
+        await expect(stop(menu)).not_to_have_attribute("data-quiet", "")
 
 
 async def test_a_filter_limits_stop_to_the_shown_robots(new_page: PageMaker) -> None:

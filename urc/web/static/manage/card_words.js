@@ -35,10 +35,10 @@ const LONGEST_HOURS_S = 48 * 3600;
  *
  * @param {Summary} robot
  * @param {number} nowS the server's time, in seconds since 1970
- * @returns {Said & {state: string}}
+ * @returns {Said & {state: string}} without words before the first connection
  */
 export function linkWords(robot, nowS) {
-  if (!robot.connected) return { state: "off", words: `○ ${awayWords(robot.seen_at, nowS)}`, tone: "" };
+  if (!robot.connected) return { state: "off", words: awayWords(robot.seen_at, nowS), tone: "" };
   switch (robot.state) {
     case "live":
       return { state: "live", words: `● ${t("Live")}`, tone: "" };
@@ -56,11 +56,11 @@ export function linkWords(robot, nowS) {
  * @param {number} nowS
  */
 function awayWords(seenAt, nowS) {
-  if (seenAt === null) return t("Not connected yet");
+  if (seenAt === null) return ""; // the card then shows what the robot is
   const ageS = Math.max(0, nowS - seenAt);
-  if (ageS < 60) return t("Last seen just now");
+  if (ageS < 60) return `○ ${t("Last seen just now")}`;
   const age = ageS > LONGEST_HOURS_S ? t("{n} days", { n: Math.floor(ageS / DAY_S) }) : ageText(ageS);
-  return t("Last seen {age} ago", { age });
+  return `○ ${t("Last seen {age} ago", { age })}`;
 }
 
 /**

@@ -31,6 +31,7 @@ const field = document.querySelector("[data-find-robot]");
 const filters = [...document.querySelectorAll("[data-filter]")].filter((el) => el instanceof HTMLElement);
 const tags = [...document.querySelectorAll("[data-tag]")].filter((el) => el instanceof HTMLElement);
 const none = document.querySelector("[data-no-match]");
+const noneOn = document.querySelector("[data-none-on]");
 const title = document.title;
 /** Wanted order of the cards. @type {string[]} */
 let order = [];
@@ -51,6 +52,7 @@ function onStopped() {
 /** @param {RobotList | null} news */
 function take(news) {
   if (root instanceof HTMLElement) root.dataset["stale"] = String(news === null);
+  if (news === null) stopAll?.lose();
   if (news === null) return; // without a server, the last states stay, greyed out
   newest = news;
   stopAll?.follow(news.robots);
@@ -79,7 +81,7 @@ function show(card, robot, nowS) {
   card.dataset["state"] = link.state;
   card.dataset["alarms"] = String(robot.alarms.count);
   card.dataset["worst"] = robot.alarms.worst;
-  put(card, "[data-link]", link);
+  put(card, "[data-link]", link.words ? link : null);
   put(card, "[data-alarms]", alarmWords(robot));
   put(card, "[data-battery]", batteryWords(robot));
   put(card, "[data-who]", whoWords(robot, stopAll?.results.get(robot.name)?.result));
@@ -101,6 +103,7 @@ function put(card, selector, what) {
 function count() {
   const on = cards.filter(isOn).length;
   const alarms = cards.filter(hasAlarm).length;
+  if (noneOn instanceof HTMLElement) noneOn.hidden = on > 0;
   /** @type {Record<string, number>} */
   const figures = { "": cards.length, on, alarms };
   for (const button of filters) {

@@ -48,6 +48,8 @@ export class StopAll {
     this.phase = "";
     /** Number of the last press; an earlier one is not repeated. */
     this.number = 0;
+    /** Whether the states of the robots are current. */
+    this.isCurrent = false;
     this.listen();
     this.button.hidden = false;
   }
@@ -78,6 +80,7 @@ export class StopAll {
    * @param {readonly Summary[]} robots
    */
   follow(robots) {
+    this.isCurrent = true;
     this.robots = new Map(robots.map((robot) => [robot.name, robot]));
     for (const [name, one] of this.results) {
       const robot = this.robots.get(name);
@@ -85,6 +88,12 @@ export class StopAll {
       else if (robot && this.latched.has(name)) this.results.delete(name); // it was reset
       if (robot?.latched && robot.confirmed) this.results.set(name, { ...one, result: "confirmed", reason: "" });
     }
+    this.show();
+  }
+
+  /** Without a server, any robot may be in motion. */
+  lose() {
+    this.isCurrent = false;
     this.show();
   }
 
@@ -149,7 +158,14 @@ export class StopAll {
     const said = this.words();
     if (this.note.textContent !== said) this.note.textContent = said;
     this.dock.dataset["bad"] = String(this.phase === "failed" || this.missing().length > 0);
-    this.button.dataset["phase"] = this.look();
+    const look = this.look();
+    this.button.dataset["phase"] = look;
+    this.button.toggleAttribute("data-quiet", look === "" && this.isAtRest());
+  }
+
+  /** Return whether no robot that a press stops is connected. */
+  isAtRest() {
+    return this.isCurrent && this.results.size === 0 && !this.names.some((name) => this.robots.get(name)?.connected);
   }
 
   /** Return the look of the button, as of STOP on the page of a robot. */
