@@ -127,6 +127,40 @@ async def test_the_last_picture_and_values_stay_in_sight_and_say_their_age(
         await expect(page.locator(GROUND_CELL)).not_to_have_attribute("data-old", re.compile(""))
 
 
+async def test_an_old_value_is_whole_next_to_its_age_on_a_phone(new_page: PageMaker) -> None:
+    robot = seeing_robot(WidgetUse("laser", "scan", {"scan": "laser"}))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="phone")
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("battery", 42)
+        await expect(page.locator(".battery-digits")).to_have_text("42")
+        robot.link("lost", REFUSED)
+        await expect(page.locator(".battery-note")).to_contain_text("old")
+        for width, height in ((390, 844), (844, 390)):
+            await page.set_viewport_size({"width": width, "height": height})
+            value = await page.locator(".battery-meter").bounding_box()
+            number = await page.locator(".battery-number").bounding_box()
+            cell = await page.locator("[data-cell]:has(> .battery)").bounding_box()
+            assert value is not None
+            assert number is not None
+            assert cell is not None
+            assert value["width"] >= number["width"] > 20
+            assert number["y"] + number["height"] <= cell["y"] + cell["height"]
+
+
+async def test_a_view_without_data_keeps_its_title(new_page: PageMaker) -> None:
+    robot = seeing_robot(WidgetUse("laser", "scan", {"scan": "laser"}, title="Laser"))
+    async with running_dashboard(robot) as address:
+        page = await new_page(size="desktop")
+        await lose(page, address, robot)
+        title = await page.locator(".scan-title").bounding_box()
+        cell = await page.locator("[data-cell]:has(> .scan)").bounding_box()
+        assert title is not None
+        assert cell is not None
+        assert cell["y"] <= title["y"] < title["y"] + title["height"] <= cell["y"] + 40
+
+
 async def test_controls_behind_the_card_are_out_of_sight_until_the_robot_is_back(
     new_page: PageMaker,
 ) -> None:

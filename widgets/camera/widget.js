@@ -269,6 +269,10 @@ class Camera {
     style.width = `${width}px`;
     style.height = `${height}px`;
     style.transform = `translate(${x}px, ${y}px) scaleX(${flip}) rotate(${angle}rad) translate(-50%, -50%)`;
+    const isLying = angle % Math.PI !== 0;
+    const [wide, high] = isLying ? [height, width] : [width, height];
+    const inset = (/** @type {number} */ free) => `${Math.max(0, free / 2)}px`;
+    this.root.style.setProperty("--urc-picture-inset", `${inset(size.height - high)} ${inset(size.width - wide)}`);
     // The crosshair marks the middle of the image.
     if (this.cross instanceof SVGElement) this.cross.style.transform = `translateY(${y - size.height / 2}px)`;
   }
