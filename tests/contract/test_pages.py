@@ -353,7 +353,7 @@ def test_each_theme_can_be_read(theme: str) -> None:
     ]
     faults += [
         f"{token} on {ground}: {contrast(token, ground):.2f}"
-        for token in ("line", "focus", "level", "alarm", "caution", *SERIES)
+        for token in ("line", "focus", "level", "alarm", "caution", "danger", *SERIES)
         for ground in ("surface", "raised", "ground")
         if contrast(token, ground) < 3
     ]

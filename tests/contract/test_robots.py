@@ -114,6 +114,18 @@ def test_the_drone_has_no_button_that_cuts_the_motors_next_to_land() -> None:
         assert max(rows, columns) >= 1, name
 
 
+def test_the_button_that_cuts_the_motors_has_one_place_on_all_pages_of_the_drone() -> None:
+    """Above “Takeoff”, or to its left on a phone in portrait; never like a chosen button."""
+    profile = profile_of(FOLDER / "tello.yaml")
+    assert profile.slots["cut"].options["look"] == "danger"
+    for interface in profile.interfaces.values():
+        for name, layout in interface.layouts.items():
+            slots = {slot.name: slot for slot in layout.slots}
+            cut, takeoff = slots["cut"], slots["takeoff"]
+            place = (takeoff.row - cut.row, takeoff.column - cut.column)
+            assert place == ((0, 4) if name == "phone_portrait" else (1, 0)), name
+
+
 def test_its_page_is_made_with_every_slot_of_each_interface(file: Path) -> None:
     """The default interface and all others, the one for finding faults among them."""
     profile = profile_of(file)
