@@ -32,6 +32,7 @@
     }
   }
   const faults = [];
+  const small = [];
   const cells = [...document.querySelectorAll('.urc-cell:not([data-place="ground"])')].filter(isShown);
   const dock = [...document.querySelectorAll(".urc-stop-button, .urc-who, .urc-take, .urc-verbs > *, .urc-drawer-handle")].filter(isShown);
   const name = (el) => (el.dataset.config ? JSON.parse(el.dataset.config).slot : el.className);
@@ -64,6 +65,11 @@
     range.selectNodeContents(node);
     const box = range.getBoundingClientRect();
     if (box.width === 0) continue;
+    const drawing = owner.closest("svg");
+    const drawn = drawing?.viewBox.baseVal;
+    const zoom = drawing && drawn?.width ? Math.min(boxOf(drawing).width / drawn.width, boxOf(drawing).height / drawn.height) : 1;
+    const px = zoom * parseFloat(getComputedStyle(owner).fontSize);
+    if (px > 0 && px < 13.9) small.push(`“${text}” has ${Math.round(10 * px) / 10} px`);
     for (let el = owner; el && el !== document.body && el !== stage; el = el.parentElement) {
       const style = getComputedStyle(el);
       if (/auto|scroll/.test(style.overflowX + style.overflowY) || style.clipPath !== "none") break;
@@ -113,6 +119,6 @@
     clear: Math.round((100 * image) / Math.max(1, seen)),
     bars: Math.round((1000 * bars) / (bars + inside)) / 10,
     isPicture: document.querySelector('[data-place="ground"][data-picture]') !== null,
-    isOverGround, scrolls, faults, edges, sizes, gap,
+    isOverGround, scrolls, faults, small, edges, sizes, gap,
   };
 }

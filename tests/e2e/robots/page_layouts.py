@@ -28,6 +28,8 @@ SCREENS = {
 }
 WIDE = ("phone, landscape", "tablet", "tablet, landscape", "desktop", "large")
 """Screens on which widgets are in front of the background."""
+ROOMY = ("tablet", "tablet, landscape", "desktop", "large")
+"""Screens on which each text is at least 14 px high."""
 IMAGE_PERCENT = 55
 """Least share of the stage that a camera's image takes without its bars and below no widget."""
 LOW_IMAGE_PERCENT = 45
@@ -109,6 +111,8 @@ def faults(seen: dict[str, Any], screen: str, is_large: bool) -> list[str]:
         lines.append(f"the bars take {seen['bars']} % of the screen")
     if screen not in WIDE and seen["isPicture"] and seen["clear"] < CLEAR_PERCENT:
         lines.append(f"widgets leave {seen['clear']} % of the camera clear")
+    if screen in ROOMY:
+        lines += seen["small"]
     if screen not in WIDE or not seen["isOverGround"]:
         return lines
     if seen["scrolls"]:
