@@ -165,6 +165,26 @@ async def test_a_command_under_way_locks_its_button(
         assert len(robot.commands) == 1
 
 
+async def test_a_button_with_nothing_to_do_is_quiet_and_works(new_page: PageMaker) -> None:
+    """The state may be wrong: a drone that says it is on the ground must still be able to land."""
+    options = {"idle_in": ["on the ground"]}
+    use = WidgetUse("ring", "button", {"state": "flight"}, {"press": "ring"}, options)
+    signals = {"flight": Signal("flight", "string")}
+    robot = FakeRobot(dashboard_profile(signals=signals, uses=[use], commands={"ring": RING}))
+    async with running_dashboard(robot) as address:
+        page = await new_page()
+        await page.goto(f"{address}robots/puppet/")
+        await until(lambda: robot.is_open)
+        robot.set_reading("flight", "on the ground")
+        await until_text(page, ".button-done", "already on the ground")
+        await expect(page.locator(".button")).to_have_attribute("data-idle", "yes")
+        await expect(page.locator(MAIN)).to_have_attribute("aria-disabled", "false")
+        await page.click(MAIN)
+        await until(lambda: len(robot.commands) == 1)
+        robot.set_reading("flight", "in the air")
+        await expect(page.locator(".button")).not_to_have_attribute("data-idle", "yes")
+
+
 async def test_a_button_is_pressed_by_keyboard_once_a_stroke(new_page: PageMaker) -> None:
     """Enter and Space give it; a key that is held down gives it no second time."""
     page = await new_page()

@@ -47,7 +47,11 @@ class Button {
     this.cooldownMs = 1000 * Number(options["cooldown"] ?? 0);
     /** @type {unknown[]} States in which the command has nothing to do. */
     this.doneIn = Array.isArray(options["done_in"]) ? options["done_in"] : [];
+    /** @type {unknown[]} States in which it usually has nothing to do, but must work. */
+    this.idleIn = Array.isArray(options["idle_in"]) ? options["idle_in"] : [];
     /** The robot's word for such a state while the robot is in it; otherwise "". */
+    this.idle = "";
+    /** The robot's word for a state of `done_in` while the robot is in it; otherwise "". */
     this.done = "";
     this.isAsking = false;
     this.coldMs = -Infinity;
@@ -103,6 +107,8 @@ class Button {
     // An old state may be wrong, and then the command may be needed.
     const isDone = state.state === "live" && this.doneIn.includes(String(state.value));
     this.done = isDone ? textOf(state, this.t) : "";
+    const isIdle = state.state === "live" && this.idleIn.includes(String(state.value));
+    this.idle = isIdle ? textOf(state, this.t) : "";
     attribute(this.root, "data-state", state.state);
     attribute(this.root, "data-alarm", state.alarm);
     if (this.value) write(this.value, textOf(state, this.t));
@@ -156,7 +162,10 @@ class Button {
     const wait = isCold && !giver.isPending ? this.t("ready in {seconds} s", { seconds: leftS }) : "";
     // A reason of the page comes first, and has the same place.
     const isDone = this.done !== "" && !giver.isPending && !giver.reason;
-    const done = isDone ? this.t("already {state}", { state: this.done }) : "";
+    const isIdle = this.idle !== "" && !giver.isPending && !giver.reason;
+    const known = isDone ? this.done : isIdle ? this.idle : "";
+    const done = known ? this.t("already {state}", { state: known }) : "";
+    attribute(this.root, "data-idle", isIdle ? "yes" : null);
     if (this.doneHint) write(this.doneHint, done);
     attribute(this.root, "data-phase", this.isAsking ? "asking" : giver.phase);
     attribute(this.main, "aria-disabled", String(!giver.isReady || giver.isPending || isCold || isDone));
