@@ -107,13 +107,17 @@ def run(*, full: bool) -> Sequence[Result]:
                 "figure": "video_age",
                 "page": name,
                 "images_hz": round(len(values) / look_s, 1),
-                "p50_ms": at_share(values, 0.5),
-                "p99_ms": at_share(values, 0.99),
+                "p50_ms": round(at_share(values, 0.5), 1),
+                "p99_ms": round(at_share(values, 0.99), 1),
             }
         )
     # Too few access units prove nothing, so the goal is missed.
     middle_ms = at_share(added, 0.5) if len(added) >= LEAST_SHARE * RATE * look_s else inf
-    shares = {"p50_ms": at_share(added, 0.5), "p99_ms": at_share(added, 0.99)} if added else {}
+    shares = {
+        name: round(at_share(added, share), 1)
+        for name, share in (("p50_ms", 0.5), ("p99_ms", 0.99))
+        if added
+    }
     tell({"figure": "video_added", "units": len(added), **shares})
     urc = ages[URC]
     return [
