@@ -94,7 +94,7 @@ def test_another_key_and_damaged_text_are_refused() -> None:
         ({"name": 7}, "no valid 'name'"),
         ({"robot": "x" * 201}, "no valid 'robot'"),
         ({"exp": "soon"}, "has no times"),
-        ({"exp": int(NOW) + 86400}, "lasts 86400 s; at most 30 s count"),
+        ({"exp": int(NOW) + 86400}, "lasts 86400 s; at most 30 s are valid"),
     ],
 )
 def test_wrong_content_is_named(change: dict[str, object], fault: str) -> None:
